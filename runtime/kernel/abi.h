@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define LOBATTO_ABI_VERSION 13u
+#define LOBATTO_ABI_VERSION 14u
 
 typedef enum lobatto_status {
     LOBATTO_OK = 0,
@@ -55,6 +55,8 @@ typedef enum lobatto_form {
     LOBATTO_GENERAL = 2
 } lobatto_form;
 
+enum { LOBATTO_CUTS_OF_STEP = 100 }; /* at most; a step with more fails */
+
 /* One call of `advance`: the step loop runs inside the kernel. */
 typedef struct lobatto_advance {
     /* in */
@@ -71,12 +73,15 @@ typedef struct lobatto_advance {
      * and events of the chain's last step are told beyond it too: no later call tells them. */
     double interval, end;
     int32_t chain_records; /* 1: the states of the chain are rows too */
+    double* cuts;          /* room for the times at which walls and switches cut steps; null: they are not told */
+    int64_t cut_capacity;  /* at least LOBATTO_CUTS_OF_STEP; when fewer are left, `advance` returns early */
     /* out */
     int32_t status;           /* the same value that `advance` returns */
     int64_t steps_done;       /* good steps of this call */
     int64_t chain_steps;      /* of kernels with a clock: steps of the chain, of this call */
     int64_t records_written;  /* rows of this call */
     int64_t events_written;   /* rows of this call */
+    int64_t cuts_written;     /* of this call */
     int64_t iterations;       /* iterations of this call, in all */
     int32_t iterations_most;  /* and the most of one step */
     double increment_largest; /* largest last increment of a good step, relative to the unknowns */

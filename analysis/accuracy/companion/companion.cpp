@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "runtime/run/near_cuts.hpp"
 #include "runtime/run/parts.hpp"
 
 namespace lobatto {
@@ -76,6 +77,7 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
     const std::int64_t kept = (request_.steps + request_.every - 1) / request_.every;
     stride_ = request_.every * std::max<std::int64_t>(1, (kept + comparisons - 1) / comparisons);
     is_driven_ = !outline.system.autonomous;
+    is_cut_ = outline.scene.is_cut();
     if (is_driven_) stride_ *= (fewest_driven_steps + stride_ - 1) / stride_;
 }
 
@@ -136,10 +138,12 @@ struct Companion::Place {
     Arrivals arrivals;
     lobatto_status status = LOBATTO_OK;
     Range range = {};  // since the last comparison
+    NearCuts cuts = {};
 
     struct State {
         std::vector<double> time, q, p;
     };
+    State before = {};  // the last step that was taken by itself
     State state() const { return {time, q, p}; }
     void go_back(const State& to) {
         time = to.time;
@@ -161,8 +165,10 @@ struct Companion::Place {
         call.tolerance = tolerance;
         call.interval = arrivals.interval;
         call.end = arrivals.end;
+        cuts.ask(call);
         std::vector<double> none, nothing;
         if (status == LOBATTO_OK) status = stepper.advance(call, none, nothing);
+        cuts.observe(call);
         stepper.state(time, q, p);
         return call.steps_done;
     }
@@ -213,25 +219,57 @@ void Companion::take_finely(Place& place, double from, const std::vector<double>
 
 // One step; shorter ones in its place, if the motion met something narrow in it.
 void Companion::take_one(Place& place, double from, const std::vector<double>& step) {
-    const Place::State before = place.state();
+    const Place::State before = place.before = place.state();
+    place.cuts.begin(from == request_.time ? from : std::numeric_limits<double>::infinity());
     place.set_step(step, request_.whole_parameters);
     place.advance(1, request_.tolerance);
-    if (narrow_.empty() || place.status != LOBATTO_OK || looked_ >= most_looked) return;
-    looked_ += std::max(looked_a_step, static_cast<std::int64_t>(narrow_.count()));
-    NarrowTerms::State begin{from, rounded(before.q, parts_), {}},
-        end{from + step.front(), rounded(place.q, parts_), {}};
-    if (place.stepper.velocity(before.time, before.q, before.p, begin.v) != LOBATTO_OK ||
-        place.stepper.velocity(place.time, place.q, place.p, end.v) != LOBATTO_OK)
-        return;
-    begin.v = rounded(begin.v, parts_);
-    end.v = rounded(end.v, parts_);
-    const std::optional<Pulse> met = narrow_.on_the_way(begin, end);
+    if (place.status != LOBATTO_OK) return;
+    std::optional<Pulse> met = narrow_term(place, step);
+    if (!met) met = near_cuts(place, step);
     if (!met || !can_halve(from, step.front())) return;
     pulses_.insert(std::upper_bound(pulses_.begin(), pulses_.end(), *met,
                                     [](const Pulse& a, const Pulse& b) { return a.time < b.time; }),
                    *met);
+    if (!is_near_pulse(from, step.front())) return;  // but for rounding it was
     place.go_back(before);
     take_finely(place, from, step);
+}
+
+// That the motion met in the last step.
+std::optional<Pulse> Companion::narrow_term(Place& place, const std::vector<double>& step) {
+    if (narrow_.empty() || looked_ >= most_looked) return std::nullopt;
+    looked_ += std::max(looked_a_step, static_cast<std::int64_t>(narrow_.count()));
+    const Place::State& before = place.before;
+    const double from = before.time.front();
+    NarrowTerms::State begin{from, rounded(before.q, parts_), {}},
+        end{from + step.front(), rounded(place.q, parts_), {}};
+    if (place.stepper.velocity(before.time, before.q, before.p, begin.v) != LOBATTO_OK ||
+        place.stepper.velocity(place.time, place.q, place.p, end.v) != LOBATTO_OK)
+        return std::nullopt;
+    begin.v = rounded(begin.v, parts_);
+    end.v = rounded(end.v, parts_);
+    return narrow_.on_the_way(begin, end);
+}
+
+// Two cuts that are nearer to one another than two steps, of the run and of this size; the first of them is in the last
+// step, or the start of the run. The steps after it are taken on trial; the end of the run counts as a cut.
+std::optional<Pulse> Companion::near_cuts(Place& place, const std::vector<double>& step) const {
+    const double first = place.cuts.last();
+    if (!is_cut_ || !std::isfinite(first)) return std::nullopt;
+    const double widest = NearCuts::near * std::fmin(std::fabs(request_.step), std::fabs(step.front())),
+                 end = time_after(request_, request_.steps);
+    const Place::State after = place.state();
+    while (place.cuts.last() == first && place.status == LOBATTO_OK &&
+           std::fabs(place.time.front() - first) <= widest) {
+        if (std::fabs(end - place.time.front()) < std::fabs(step.front()) / 2)
+            place.cuts.observe(end);
+        else
+            place.advance(1, request_.tolerance);
+    }
+    place.status = LOBATTO_OK;
+    place.go_back(after);
+    if (!(place.cuts.gap() < widest)) return std::nullopt;
+    return Pulse{place.cuts.middle(), place.cuts.gap()};
 }
 
 void Companion::take(Place& place, const Segment& part) {
@@ -242,7 +280,7 @@ void Companion::take(Place& place, const Segment& part) {
     std::int64_t done = 0;
     while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
         const double here = from + static_cast<double>(done) * size;
-        const bool looks = !narrow_.empty() && !is_clocked() && looked_ < most_looked;
+        const bool looks = !is_clocked() && (is_cut_ || (!narrow_.empty() && looked_ < most_looked));
         std::int64_t count = 0;
         const bool is_even = pulses_.empty() && knots_.empty();
         while (!looks && count < std::min(piece, part.taken - done) &&

@@ -4,9 +4,10 @@
 // of their steps; where rounding decides, D is the error itself, about.
 //
 // Where explicit time makes short pulses, or the motion meets terms that are narrower than a step (narrow_terms.hpp),
-// which steps may miss, the companion takes short ones. Its steps end at the knots of measured values in time. In
-// equally many times it takes steps of a number without a common divisor with that of the run: oscillations that look
-// constant to the one do not to the other.
+// which steps may miss, the companion takes short ones; likewise between two cuts at walls and switches that are near
+// to one another, because a contact in one piece of a step has the same error in both. Its steps end at the knots of
+// measured values in time. In equally many times it takes steps of a number without a common divisor with that of the
+// run: oscillations that look constant to the one do not to the other.
 //
 // The companion begins four units in the last place beside the start: what no number of steps can know, and what grows
 // where nearby trajectories diverge, is an error too.
@@ -90,6 +91,8 @@ private:
     // `step` has all digits: steps and the parts of them end at the times of the run.
     void take_finely(Place& place, double from, const std::vector<double>& step);
     void take_one(Place& place, double from, const std::vector<double>& step);
+    std::optional<Pulse> narrow_term(Place& place, const std::vector<double>& step);
+    std::optional<Pulse> near_cuts(Place& place, const std::vector<double>& step) const;
     bool has_caught_up() const;
     bool has_compared() const;
     bool can_halve(double from, double step) const;
@@ -112,6 +115,7 @@ private:
     std::vector<double> knots_;  // of measured values in time, at which its steps end
     std::int64_t looked_ = 0;    // at terms, along steps of the companion
     bool is_driven_ = false;     // explicit time
+    bool is_cut_ = false;        // at walls and switches
     std::int64_t stride_;        // steps of the run between comparisons
     std::int64_t seen_ = 0;
     std::vector<Point> run_;               // of the run, at comparisons

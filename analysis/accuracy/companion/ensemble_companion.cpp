@@ -160,7 +160,7 @@ bool EnsembleCompanion::meets_narrow_terms(const EnsembleTrajectory& trajectory,
 }
 
 bool EnsembleCompanion::goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) {
-    if (meets_narrow_terms(trajectory, start)) return true;
+    if (trajectory.has_near_cuts || meets_narrow_terms(trajectory, start)) return true;
     if (outline_.system.autonomous) return false;
     return (request_.every < fewest_driven_steps && request_.every > 0) || has_pulses(start);
 }

@@ -107,6 +107,7 @@ struct Advance {
             if (until_record == 1 && call.records_written + call.dense >= call.capacity) break;
             if constexpr (is_watched) {
                 if (call.events != nullptr && call.events_written + AnyWatch::most > call.event_capacity) break;
+                if (call.cuts != nullptr && call.cuts_written + LOBATTO_CUTS_OF_STEP > call.cut_capacity) break;
                 watch->keep(stepper);
             }
             const Status status = stepper.step();
@@ -123,6 +124,7 @@ struct Advance {
                     --call.steps_done;
                     return found;
                 }
+                tell_cuts(*watch, call);
             }
             if (--until_record == 0) {
                 if constexpr (has_dense) {
@@ -137,6 +139,12 @@ struct Advance {
             }
         }
         return Status::ok;
+    }
+    template <class AnyWatch>
+    static void tell_cuts(const AnyWatch& watch, lobatto_advance& call) {
+        static_assert(AnyWatch::most_impacts <= LOBATTO_CUTS_OF_STEP);
+        for (int i = 0; i < watch.cuts && call.cuts != nullptr; ++i)
+            call.cuts[call.cuts_written++] = static_cast<double>(watch.cut_at[i]);
     }
     static real* next_row(lobatto_advance& call) { return out(call.records) + call.records_written++ * (1 + 2 * n); }
 };

@@ -103,7 +103,7 @@ struct Export {
             stepper, [&](auto& s) { Sides<K>::take_at(s, *in(time), in(q), in(velocity)); }, use);
     }
     static std::int32_t advance(void* stepper, lobatto_advance* call) {
-        call->steps_done = call->records_written = call->events_written = call->iterations = 0;
+        call->steps_done = call->records_written = call->events_written = call->cuts_written = call->iterations = 0;
         call->chain_steps = 0;
         call->iterations_most = 0;
         call->increment_largest = call->increment_failed = 0.0;

@@ -217,6 +217,10 @@ public:
     static constexpr int most_impacts = walls > 0 ? 100 : 0;                             // in one step
     static constexpr int most = Events<K>::most + most_impacts * (1 + Events<K>::most);  // rows of one step
 
+    // Of the last step: when walls and switches cut it.
+    real cut_at[most_impacts + 1]{};
+    int cuts{};
+
     explicit Watch(const S& stepper) : events(stepper), rest(walls > 0 ? new S(stepper) : nullptr) {}
     Watch(const Watch&) = delete;
     Watch& operator=(const Watch&) = delete;
@@ -281,7 +285,7 @@ private:
         Walls<K> wall;
         Status status = wall.look(stepper, time, q, p);
         S* step = &stepper;
-        impacts = 0;
+        impacts = cuts = 0;
         while (status == Status::ok) {
             for (int w = 0; w < walls; ++w) {
                 events.slack[w] = wall.slack[w];
@@ -306,6 +310,7 @@ private:
             if (status == Status::ok) status = wall.look(stepper, row[0], row + 1, row + 1 + n);
             if (status == Status::ok) status = pass(stepper, wall, number - first_wall, rows, count);
             if (status != Status::ok) break;
+            cut_at[cuts++] = wall.time;
             const real left = end - wall.time;
             step = rest;
             if (!(left * stepper.step_size > real(0)) || wall.time + left == wall.time) {

@@ -23,6 +23,7 @@ struct Ended {
     std::vector<double> rows, energies;
     std::int64_t row_step = 0;  // steps before the last row
     int stop = -1;              // of a trajectory that a stop ended: which
+    bool has_near_cuts = false;
     std::vector<double> reduced;
     double energy_error_largest = 0;
     // Where numbers have several parts: rows and energies with all of them. The energy at the start always.

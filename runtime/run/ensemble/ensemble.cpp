@@ -188,8 +188,10 @@ private:
             shared_.steps_gone += (done - from) * side_by_side;
         }
         shared_.steps_gone += (request_.steps - done) * side_by_side;
-        for (std::size_t lane = 0; lane < ended.size(); ++lane)
+        for (std::size_t lane = 0; lane < ended.size(); ++lane) {
             if (reduces_[lane]) ended[lane].reduced = lanes_->reduced(lane);
+            ended[lane].has_near_cuts = lanes_->gap_of_cuts() < NearCuts::near * std::fabs(request_.step);
+        }
         return !lanes_->is_cut_short();
     }
 
@@ -332,6 +334,7 @@ EnsembleTrajectory view(std::int64_t index, const Ended& ended) {
     trajectory.steps_done = ended.steps_done;
     trajectory.iterations = ended.iterations;
     trajectory.stop = ended.stop;
+    trajectory.has_near_cuts = ended.has_near_cuts;
     trajectory.reduced = &ended.reduced;
     const std::int64_t count = std::ssize(ended.energies);
     trajectory.kept = {ended.rows.data(), ended.energies.data(), count,

@@ -43,8 +43,9 @@ struct EnsembleTrajectory {
     double energy_error_final = 0;               // H - H(0)
     double energy_error_largest = 0;             // max over the kept states |H - H(0)|
     const double* whole_energy_start = nullptr;  // where numbers have parts
-    int stop = -1;  // of a trajectory that a stop ended: the number of the event; its last state is
-                    // that of the stop
+    int stop = -1;               // of a trajectory that a stop ended: the number of the event; its last state is
+                                 // that of the stop
+    bool has_near_cuts = false;  // of walls and switches (NearCuts)
     const std::vector<double>* reduced = nullptr;  // what its reducer made of it
 
     double energy_error(std::int64_t row) const;  // H - H(0) of a kept state; not a number when there is none

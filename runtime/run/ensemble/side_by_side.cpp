@@ -36,6 +36,7 @@ void SingleTrajectory::start(double time, const std::vector<double>& q, const st
                              std::int32_t* status) {
     time_ = time;
     stop_ = -1;
+    cuts_.begin(time);
     if (*status == LOBATTO_OK) *status = stepper_.start(time, q, p);
 }
 
@@ -66,10 +67,12 @@ void SingleTrajectory::advance(const EnsembleRequest& request, std::int64_t step
         call.events = events_.data();
         call.event_capacity = std::ssize(events_) / (1 + columns);
     }
+    cuts_.ask(call);
     *steps_done = *iterations = 0;
     do {  // a clock, or full rows, may need several calls
         call.steps = steps - *steps_done;
         *status = stepper_.advance(call);
+        cuts_.observe(call);
         *steps_done += call.steps_done;
         *iterations += call.iterations;
         if (reducer_) {
@@ -117,6 +120,7 @@ void NumberTrajectory::start(double time, const std::vector<double>& q, const st
                              std::int32_t* status) {
     time_ = as_parts({time}, stepper_.parts());
     stop_ = -1;
+    cuts_.begin(time);
     if (*status == LOBATTO_OK) *status = stepper_.start(time_, q, p);
 }
 
@@ -125,11 +129,13 @@ void NumberTrajectory::advance(const EnsembleRequest& request, std::int64_t step
     lobatto_advance call{};
     call.tolerance = request.tolerance;
     call.event_capacity = event_rows_;
+    cuts_.ask(call);
     std::vector<double> records, events;
     *steps_done = *iterations = 0;
-    do {  // full rows of events may need several calls
+    do {  // full rows may need several calls
         call.steps = steps - *steps_done;
         *status = stepper_.advance(call, records, events);
+        cuts_.observe(call);
         *steps_done += call.steps_done;
         *iterations += call.iterations;
     } while (*status == LOBATTO_OK && *steps_done < steps);

@@ -5,12 +5,14 @@
 // which is one double in lanes. Stops and reductions are of single trajectories and of those on a device.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <vector>
 
 #include "runtime/build/library.hpp"
 #include "runtime/build/number_stepper.hpp"
 #include "runtime/run/ensemble/ensemble.hpp"
+#include "runtime/run/near_cuts.hpp"
 
 namespace lobatto {
 
@@ -31,6 +33,8 @@ public:
     // Of a trajectory that was stopped: by which event, and when.
     virtual int stop(std::size_t) const { return -1; }
     virtual double stop_time(std::size_t) const { return 0; }
+    // The shortest time between two cuts since the start (NearCuts).
+    virtual double gap_of_cuts() const { return std::numeric_limits<double>::infinity(); }
     // From the start on everything is handed to the reducer of a single trajectory; what it, or a device, made of it.
     virtual void reduce(const EnsembleStart&) {}
     virtual std::vector<double> reduced(std::size_t) const { return {}; }
@@ -52,6 +56,7 @@ public:
     void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
     int stop(std::size_t) const override { return stop_; }
     double stop_time(std::size_t) const override { return time_; }
+    double gap_of_cuts() const override { return cuts_.gap(); }
     void reduce(const EnsembleStart& start) override;
     std::vector<double> reduced(std::size_t) const override { return reducer_->values(); }
 
@@ -64,6 +69,7 @@ private:
     double time_ = 0;
     int stop_ = -1;
     std::vector<double> stop_q_, stop_p_;
+    NearCuts cuts_;
 };
 
 // Of a kernel in other numbers than double; it reduces nothing.
@@ -79,12 +85,14 @@ public:
     void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
     int stop(std::size_t) const override { return stop_; }
     double stop_time(std::size_t) const override { return time_[0]; }
+    double gap_of_cuts() const override { return cuts_.gap(); }
 
 private:
     NumberStepper stepper_;
     std::int64_t event_rows_;
     std::vector<double> time_, stop_q_, stop_p_;
     int stop_ = -1;
+    NearCuts cuts_;
 };
 
 class LaneTrajectories : public Trajectories {

@@ -97,7 +97,7 @@ TEST_CASE("a file that is not a kernel, or not the expected one, is refused with
     CHECK(refusal(kernel_builder.build("library", "int nothing;\n")) ==
           "it has no function lobatto_kernel_table, so it is not such a kernel");
     CHECK(refusal(kernel_builder.build_stub("3", "sizeof(lobatto_kernel)")) ==
-          "it speaks version 3 of the kernel interface, this program version 13");
+          "it speaks version 3 of the kernel interface, this program version 14");
     CHECK(refusal(kernel_builder.build_stub("LOBATTO_ABI_VERSION", "8")) ==
           "its function table has 8 bytes instead of " + std::to_string(sizeof(lobatto_kernel)));
     CHECK(refusal(kernel_builder.build_pendulum(), "fedcba9876543210") ==

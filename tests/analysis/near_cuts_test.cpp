@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Contacts that begin and end within a step: run and companion would take them in the same piece of a step.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <lobatto/lobatto.hpp>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/analysis/measured_scene.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+using test::absolute_error, test::MeasuredScene;
+
+namespace {
+
+constexpr double g = 9.81;
+
+// A ball that falls from 1 onto a floor with the potential k y^2/2 below 0.
+std::string on_springs(double k, double step, double until, const std::string& method = "points = 4") {
+    return fmt::format(
+        "lagrangian = \"y'^2/2 - 9.81*y - k/2*max(-y, 0)^2\"\n[coordinates]\ny = {{ position = 1, velocity = 0 }}\n"
+        "[parameters]\nk = {}\n[method]\n{}\n[run]\nstep = {}\nuntil = {}\n",
+        k, method, step, until);
+}
+
+// Where it is: y = g/k (cos w s - 1) - v/w sin w s in a contact that begins with the velocity -v at s = 0.
+double true_place(double k, double time) {
+    const double v = std::sqrt(2 * g), w = std::sqrt(k), flight = 2 * v / g,
+                 contact = 2 * (std::acos(-1.0) - std::atan(v * w / g)) / w;
+    const double s = std::fmod(time - flight / 2, contact + flight);
+    if (s < 0) return 1 - g * time * time / 2;
+    if (s < contact) return g / k * (std::cos(w * s) - 1) - v / w * std::sin(w * s);
+    return v * (s - contact) - g * (s - contact) * (s - contact) / 2;
+}
+
+}  // namespace
+
+TEST_CASE("a contact that is shorter than a step is measured, wherever in the steps it lies") {
+    struct Case {
+        double k, step, until;
+    };
+    for (const Case& one : {Case{1e4, 0.2, 5}, Case{1e3, 0.5, 5}, Case{4e5, 1.0 / 60, 2}, Case{1e5, 0.05, 3},
+                            Case{1e4, 0.0301, 2}, Case{1e7, 0.002, 1}, Case{1e4, 0.5, 0.5}}) {
+        CAPTURE(one.k);
+        CAPTURE(one.step);
+        const MeasuredScene scene(on_springs(one.k, one.step, one.until));
+        const test::Finished finished = scene.run();
+        INFO(finished.err);
+        REQUIRE(finished.exit_code == 0);
+        const double error = std::fabs(scene.end()[1] - true_place(one.k, one.until)),
+                     printed = absolute_error(finished.out);
+        CAPTURE(error);
+        CHECK(printed > 0.6 * error);
+        CHECK(printed < 1.7 * error);
+    }
+}
+
+TEST_CASE("a contact that begins before a step ends and ends in the next one is measured") {
+    // The same ball, with the contact around the end of the step at which steps and halves of them end.
+    const double k = 4e4, w = std::sqrt(k), v = std::sqrt(2 * g),
+                 middle = v / g + (std::acos(-1.0) - std::atan(v * w / g)) / w, step = middle / 5;
+    const MeasuredScene scene(on_springs(k, step, 10 * step));
+    const test::Finished finished = scene.run();
+    REQUIRE(finished.exit_code == 0);
+    const double error = std::fabs(scene.end()[1] - true_place(k, 10 * step)), printed = absolute_error(finished.out);
+    CAPTURE(error);
+    CHECK(printed > 0.6 * error);
+    CHECK(printed < 1.7 * error);
+}
+
+TEST_CASE("two impacts within a step do not hide the error of the flight between them") {
+    // On a pendulum's circle between two walls that are near to one another, against many times shorter steps.
+    const auto text = [](double step) {
+        return fmt::format(
+            "lagrangian = \"a'^2/2 + 4*cos(3*a)\"\n[coordinates]\na = {{ position = 0.1, velocity = 9 }}\n[impacts]\n"
+            "right = {{ when = \"a = 0.4 rising\", restitution = 1 }}\n"
+            "left = {{ when = \"a = -0.3 falling\", restitution = 1 }}\n[method]\npoints = 3\n[run]\nstep = {}\n"
+            "until = 0.9\n",
+            step);
+    };
+    const MeasuredScene coarse(text(0.18)), fine(text(0.18 / 64));
+    const test::Finished finished = coarse.run();
+    REQUIRE(finished.exit_code == 0);
+    REQUIRE(fine.run().exit_code == 0);
+    const double error = std::fabs(coarse.end()[1] - fine.end()[1]), printed = absolute_error(finished.out);
+    CAPTURE(error);
+    CHECK(printed > 0.5 * error);
+    CHECK(printed < 2 * error);
+}
+
+TEST_CASE("in sweeps such a trajectory is measured by a companion of its own") {
+    namespace lob = lobatto::api;
+    for (const char* numbers : {"", "double-double"}) {
+        CAPTURE(numbers);
+        lob::SweepOptions options;
+        options.numbers = numbers;
+        lob::Starts starts;
+        starts.columns["k"] = {1e3, 1e4, 2e4, 1e5};
+        starts.count = 4;
+        const lob::Sweep result =
+            lob::sweep(lob::Scene::from_text(on_springs(1, 0.1, 2), "springs.toml"), starts, options);
+        for (std::size_t i = 0; i < 4; ++i) {
+            CAPTURE(i);
+            const double k = starts.columns["k"][i], error = std::fabs(result.q[i] - true_place(k, 2)) / 0.5;
+            CAPTURE(error);
+            CHECK(result.error[i] > 0.5 * error);
+            CHECK(result.error[i] < 2 * error);
+        }
+    }
+}
