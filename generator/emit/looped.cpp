@@ -167,14 +167,19 @@ std::string LoopedText::loops(LoopPart::Of part, const char* variables) const {
                 begin += fmt::format("            const auto {} = {}[{}];\n", value, variables,
                                      mentions(inside, index) ? index : place);
         }
+        // Constants in the numbers of the function, which may be coarser than those of the steps.
+        const std::string cast = has_parameters(element)           ? ""
+                                 : part == LoopPart::Of::quadratic ? "real("
+                                                                   : "static_cast<given>(";
         for (std::size_t j = 0; j < element.a.size(); ++j) {
             const std::string value = fmt::format("a{}", j);
             if (mentions(inside, value))
-                begin += fmt::format("            const auto {} = {}{}_a[{} + {}];\n", value,
-                                     has_parameters(element) ? "k." : "", name, j * values,
+                begin += fmt::format("            const auto {} = {}{}_a[{} + {}]{};\n", value,
+                                     has_parameters(element) ? "k." : cast, name, j * values,
                                      !pairs                             ? "r"
                                      : pairs->coefficients[j].of_second ? "other - 1"
-                                                                        : "body");
+                                                                        : "body",
+                                     cast.empty() ? "" : ")");
         }
         const bool counts = mentions(inside, "r");  // the rows
         const std::string loop =

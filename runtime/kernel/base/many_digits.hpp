@@ -213,6 +213,14 @@ inline ManyDigits<bits> fabs(const ManyDigits<bits>& x) {
         using View = typename ManyDigits<bits>::View;                                                      \
         free_constants_at_the_end_of_the_thread();                                                         \
         return ManyDigits<bits>::result_of([&](mpfr_ptr r) { mpfr_##f(r, View(x), View(y), MPFR_RNDN); }); \
+    }                                                                                                      \
+    template <int bits>                                                                                    \
+    inline ManyDigits<bits> f(double x, const ManyDigits<bits>& y) {                                       \
+        return f(ManyDigits<bits>(x), y);                                                                  \
+    }                                                                                                      \
+    template <int bits>                                                                                    \
+    inline ManyDigits<bits> f(const ManyDigits<bits>& x, double y) {                                       \
+        return f(x, ManyDigits<bits>(y));                                                                  \
     }
 LOBATTO_FUNCTION(atan2)
 LOBATTO_FUNCTION(pow)
