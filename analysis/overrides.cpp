@@ -39,7 +39,7 @@ void set_parameter(const std::string& argument, Scene& scene) {
     if (equals == std::string::npos) source.fail({1, 1}, "expected name=value, such as --set m=2");
     const std::string name = argument.substr(0, equals);
     const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(),
-                                        [&](const Parameter& p) { return p.written == name; });
+                                        [&](const Parameter& p) { return p.written == name || p.name == name; });
     if (parameter == scene.parameters.end()) fail_unknown(source, scene, name);
     const Scope scope{nullptr, fmt::format("the value of {}", name), false, {}};
     const Text text = text_of(argument, equals + 1);

@@ -15,7 +15,7 @@
 
 #include "kernel.hpp"
 
-namespace lobatto::kernels {
+namespace lobatto::kernels { inline namespace of_cab3db5cdb35e953 {
 
 struct harmonic_oscillator {
     using real = double;
@@ -147,4 +147,4 @@ struct harmonic_oscillator {
     }
 };
 
-}  // namespace lobatto::kernels
+}}  // namespace lobatto::kernels

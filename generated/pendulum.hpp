@@ -14,7 +14,7 @@
 
 #include "kernel.hpp"
 
-namespace lobatto::kernels {
+namespace lobatto::kernels { inline namespace of_911777cba86669e1 {
 
 struct pendulum {
     using real = double;
@@ -134,4 +134,4 @@ struct pendulum {
     }
 };
 
-}  // namespace lobatto::kernels
+}}  // namespace lobatto::kernels

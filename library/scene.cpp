@@ -94,8 +94,13 @@ std::vector<std::string> events_of(const lobatto::Scene& scene) {
 }
 
 std::size_t index_of(const std::vector<Variable>& parameters, const std::string& name) {
+    std::string in_table = name;  // tau[2] is tau_2 there
+    if (name.ends_with(']')) {
+        std::replace(in_table.begin(), in_table.end(), '[', '_');
+        in_table.pop_back();
+    }
     const auto found =
-        std::find_if(parameters.begin(), parameters.end(), [&](const Variable& one) { return one.name == name; });
+        std::find_if(parameters.begin(), parameters.end(), [&](const Variable& one) { return one.name == in_table; });
     if (found != parameters.end()) return static_cast<std::size_t>(found - parameters.begin());
     std::vector<std::string> names;
     for (const Variable& parameter : parameters) names.push_back(parameter.name);

@@ -10,6 +10,7 @@
 #include "analysis/kernel/derived_kernel.hpp"
 #include "generator/mechanics/start.hpp"
 #include "library/parts.hpp"
+#include "runtime/run/near_cuts.hpp"
 #include "runtime/run/other_velocity.hpp"
 
 namespace lobatto::api {
@@ -70,8 +71,8 @@ Kernel compile(const Scene& scene, const Settings& settings) {
                 "run(), which computes in all numbers",
                 changed.path, precision_name(changed.method.numbers)));
         changed.outputs.energy = true;
-        const DerivedKernel derived = derived_kernel(changed, {});
         const Overrides overrides = overrides_of(settings);
+        const DerivedKernel derived = derived_kernel(changed, {}, nullptr, overrides);
         apply(overrides, changed);
         if (!overrides.set.empty()) check_values(changed);
         const Steps steps = steps_of(changed, overrides);
@@ -187,6 +188,21 @@ struct Stepper::Parts {
             restart();
             throw;
         }
+    }
+
+    // Whether a wall or a switch cuts the step from here. With a clock there are none.
+    bool is_cut_next() const {
+        if (!kernel.parts().scene.is_cut()) return false;
+        LoadedStepper<double> trial(stepper.kernel());
+        NearCuts cuts;
+        cuts.begin(std::numeric_limits<double>::infinity());
+        lobatto_advance call{};
+        call.steps = 1;
+        call.tolerance = kernel.parts().start.tolerance;
+        cuts.ask(call);
+        if (trial.prepare(parameters, step) != LOBATTO_OK || trial.start(time, q, p) != LOBATTO_OK) return false;
+        trial.advance(call);
+        return call.cuts_written > 0;
     }
 
     // Of steps of equal length; with a clock an arrival at a time.
@@ -403,7 +419,7 @@ std::pair<std::vector<double>, std::vector<double>> Stepper::at(double t) const 
         if (stepper.dense(std::clamp(theta, 0.0, 1.0), state.first, state.second) != LOBATTO_OK)
             throw InputError(
                 "at: this step has no polynomial: splitting methods have none, and there is none across an impact or a "
-                "switch; use advance_to");
+                "switch. Copy the stepper before the step, and let the copy advance_to this time");
         return state;
     });
 }
@@ -416,6 +432,10 @@ std::vector<double> Stepper::tangent() const {
             throw InputError(
                 "tangent: this kernel has no derivative of a step: the scene leaves it out, or has "
                 "constraints");
+        if (parts.is_cut_next())
+            throw ComputationError(
+                "tangent: a wall or a switch cuts the step from here, and this is the derivative of a whole one. Take "
+                "differences of steps from starts that are near to one another");
         if (const auto status = parts.stepper.tangent(parts.time, parts.q, parts.p, q, p, T); status != LOBATTO_OK)
             parts.fail(status, {});
         return T;

@@ -21,7 +21,7 @@ using Json = nlohmann::json;
 
 // Everything that the kernel's text depends on. The text of the file is not enough: the method and the outputs may have
 // been changed after it was read.
-std::string key_of(const Scene& scene, const KernelWish& wish) {
+std::string key_of(const Scene& scene, const std::vector<Parameter>& values, const KernelWish& wish) {
     std::string key =
         fmt::format("program: {}\nname: {}\nnumbers: {}, general: {}, wants energy: {}\n", build_id(), scene.name,
                     precision_name(wish.precision), wish.general, wish.wants_energy != nullptr);
@@ -46,6 +46,11 @@ std::string key_of(const Scene& scene, const KernelWish& wish) {
                 for (const cln::cl_R& c : spline.coefficients()[i]) digits << ',' << c;
         }
         key += fmt::format("table: {}{}\n", spline_name(table.spline), digits.str());
+    }
+    for (const Parameter& parameter : values) {
+        std::ostringstream value;
+        value << parameter.value;
+        key += fmt::format("value: {} = {}\n", parameter.name, value.str());
     }
     return key + "scene:\n" + scene.source.content();
 }
@@ -117,11 +122,10 @@ DerivedKernel derived(const Scene& scene, const KernelWish& wish, const Derivati
     return kernel;
 }
 
-}  // namespace
-
-DerivedKernel derived_kernel(const Scene& scene, const KernelWish& wish, const Derivation* known) {
+DerivedKernel kept_or_derived(const Scene& scene, const KernelWish& wish, const Derivation* known) {
     if (build_id().empty()) return derived(scene, wish, known);
-    const CacheEntry entry(scene.name, key_of(scene, wish), ".derived");
+    const std::vector<Parameter>& values = known != nullptr ? known->scene.parameters : scene.parameters;
+    const CacheEntry entry(scene.name, key_of(scene, values, wish), ".derived");
     if (const auto text = entry.valid_object()) return from_text(*text, scene, wish);
     const CacheEntry::Lock lock(entry);
     if (const auto text = entry.valid_object()) return from_text(*text, scene, wish);  // derived while we waited
@@ -129,6 +133,22 @@ DerivedKernel derived_kernel(const Scene& scene, const KernelWish& wish, const D
     write_file(entry.building_path() + "/derived", kept_text(facts_of(*kernel.derivation), kernel.source));
     entry.publish("derived");
     return kernel;
+}
+
+}  // namespace
+
+DerivedKernel derived_kernel(const Scene& scene, const KernelWish& wish, const Derivation* known,
+                             const Overrides& overrides) {
+    try {
+        return kept_or_derived(scene, wish, known);
+    } catch (const InputError&) {
+        if (overrides.set.empty()) throw;
+    }
+    Scene changed = scene;
+    Overrides values;
+    values.set = overrides.set;
+    apply(values, changed);
+    return kept_or_derived(changed, wish, nullptr);
 }
 
 }  // namespace lobatto

@@ -162,6 +162,19 @@ Steps SweepStudy::steps_of_setting(Scene& scene) const {
     return lobatto::steps_of(scene, options_.overrides);
 }
 
+// Of the parameters of one trajectory.
+Overrides SweepStudy::values_of(std::int64_t index) const {
+    EnsembleStart start;
+    start.parameters.resize(scene_.parameters.size());
+    start.q.resize(scene_.coordinates.size());
+    start.rate.resize(scene_.coordinates.size());
+    starts_->start(index, start);
+    Overrides values;
+    for (std::size_t k = 0; k < scene_.parameters.size(); ++k)
+        values.set.push_back(fmt::format("{}={}", scene_.parameters[k].written, start.parameters[k]));
+    return values;
+}
+
 std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     const std::int64_t first = number * starts_->count_of_setting();
     auto setting = std::make_unique<Setting>();
@@ -177,7 +190,7 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
         Scene scene = starts_->with_settings(as_written_, first);
         if (!scene_.outputs.kept.empty()) scene.outputs.energy = true;
         const auto derived_in = [&](Precision numbers, const Derivation* derivation) {
-            return derived_kernel(scene, {numbers, false, EnergyWatch::can_watch}, derivation);
+            return derived_kernel(scene, {numbers, false, EnergyWatch::can_watch}, derivation, values_of(first));
         };
         DerivedKernel derived = derived_in(method.numbers, nullptr);
         known.source = std::make_shared<const KernelSource>(std::move(derived.source));

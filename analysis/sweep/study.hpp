@@ -89,6 +89,7 @@ private:
     std::unique_ptr<Setting> prepare(std::int64_t number);
     EnsembleRequest request_of(const Setting& setting) const;
     Steps steps_of_setting(Scene& scene) const;
+    Overrides values_of(std::int64_t index) const;
     void put_on_device(Setting& setting) const;
     void enter(std::int64_t number);
     void note_warning();

@@ -119,6 +119,11 @@ void emit_scene(const EmitCommand& options) {
     if (options.ensemble && !options.standalone)
         throw InputError(
             "--ensemble: kernel.hpp carries ensembles anyway; leave --ensemble out, or add --standalone for one file");
+    const lobatto::Scene& read = scene.parts().scene;
+    if (options.ensemble && (read.is_cut() || !read.constraints.empty()))
+        throw InputError(
+            "--ensemble: walls, switches and constraints are followed by one trajectory at a time; leave it out, and "
+            "take one stepper for each");
     const bool printed = is_printed(options);
     if (options.plain) {
         const PlainSource source = api::plainly_emitted(scene, settings);

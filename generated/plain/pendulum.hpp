@@ -47,39 +47,39 @@ constexpr real rounding = 10000000 * std::numeric_limits<real>::epsilon();
 constexpr real small_part = real(0.0001);
 
 // The larger one, or not a number.
-inline real larger(real one, real other) { return one >= other || std::isnan(one) ? one : other; }
+static inline real larger(real one, real other) { return one >= other || std::isnan(one) ? one : other; }
 // The change of a number; what it is measured against is at least a small part of the largest of its kind, whose
 // rounding it gets.
-inline real relative_change(real next, real last, const real* all) {
+static inline real relative_change(real next, real last, const real* all) {
     real largest = 0;
     for (int k = 0; k < n; ++k) largest = larger(largest, std::fabs(all[k]));
     const real size = std::fabs(next) + std::fabs(last) + small_part * largest;
     return next == last ? 0 : std::fabs(next - last) / size;
 }
 // A step later; what rounding leaves out of the time is kept beside it, else it would add up.
-inline void add_time(real h, State& x) {
+static inline void add_time(real h, State& x) {
     const real step = h + x.t_rest, sum = x.t + step;
     x.t_rest = step - (sum - x.t);
     x.t = sum;
 }
-inline bool is_finite(const State& x) {
+static inline bool is_finite(const State& x) {
     bool all = std::isfinite(x.t);
     for (int k = 0; k < n; ++k) all = all && std::isfinite(x.q[k]) && std::isfinite(x.p[k]);
     return all;
 }
 
 // W = M^-1 (grad V - F): minus the acceleration at q (D1).
-inline void minus_acceleration(const Parameters& parameters, real, const real* q, real* W) {
+static inline void minus_acceleration(const Parameters& parameters, real, const real* q, real* W) {
     W[0] = (parameters.omega * parameters.omega) * std::sin(q[0]);
 }
 
 // p = M v (D2).
-inline void momentum(const Parameters& parameters, const real* velocity, real* p) {
+static inline void momentum(const Parameters& parameters, const real* velocity, real* p) {
     p[0] = parameters.m * velocity[0];
 }
 
 // v = M^-1 p.
-inline void velocity(const Parameters& parameters, const real* p, real* velocity) {
+static inline void velocity(const Parameters& parameters, const real* p, real* velocity) {
     velocity[0] = p[0] / parameters.m;
 }
 
@@ -90,7 +90,7 @@ inline void velocity(const Parameters& parameters, const real* p, real* velocity
 //   Q_i = q + h c_i v - h^2 sum_j A_ij W(Q_j)            inner nodes, i = 2 ... s - 1                          (D12)
 //   q1  = q + h v     - h^2 sum_j b_j (1 - c_j) W(Q_j)                                                         (D16)
 //   u1  = v - h sum_j b_j W(Q_j) - h b_s W(q1)           p1 = M u1                                             (D17)
-inline bool step(const Parameters& parameters, real h, State& x) {
+static inline bool step(const Parameters& parameters, real h, State& x) {
     real u[n], v[n], Q[s][n], W[s][n];
     velocity(parameters, x.p, u);
     minus_acceleration(parameters, x.t, x.q, W[0]);
@@ -132,14 +132,14 @@ inline bool step(const Parameters& parameters, real h, State& x) {
 }
 
 // H(q, p) = p^T M^-1 p / 2 + V(q) (D3).
-inline real energy(const Parameters& parameters, real, const real* q, const real* p) {
+static inline real energy(const Parameters& parameters, real, const real* q, const real* p) {
     return (parameters.m * (parameters.omega * parameters.omega)) * (1.0 - std::cos(q[0])) + p[0] * ((0.5 /
         parameters.m) * p[0]);
 }
-inline real energy(const Parameters& parameters, const State& x) { return energy(parameters, x.t, x.q, x.p); }
+static inline real energy(const Parameters& values, const State& x) { return energy(values, x.t, x.q, x.p); }
 
 // The start of the scene.
-inline State start(const Parameters& parameters) {
+static inline State start(const Parameters& parameters) {
     State x;
     x.q[0] = 1.5707963267948966;
     const real v[n] = {0.0};

@@ -352,6 +352,11 @@ KernelSource emit_kernel(const Derivation& derivation, const OptimisedPrograms& 
     source.digest = digest_of(source.formulas);
     const std::string empty = "digest = \"\"";
     source.formulas.replace(source.formulas.find(empty), empty.size(), "digest = \"" + source.digest + "\"");
+    // Two kernels of one name are two types of a program, not one that the linker chooses.
+    const std::string outer = "namespace lobatto::kernels {", end = "}  // namespace lobatto::kernels";
+    source.formulas.replace(source.formulas.find(outer), outer.size(),
+                            fmt::format("{} inline namespace of_{} {{", outer, source.digest));
+    source.formulas.replace(source.formulas.rfind(end), end.size(), "}" + end);
     source.header = header(derivation, source, options);
     return source;
 }

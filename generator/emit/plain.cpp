@@ -25,7 +25,7 @@ const char* const solved_step = R"(
 //   Q_i = q + h c_i v - h^2 sum_j A_ij W(Q_j)            inner nodes, i = 2 ... s - 1                          (D12)
 //   q1  = q + h v     - h^2 sum_j b_j (1 - c_j) W(Q_j)                                                         (D16)
 //   u1  = v - h sum_j b_j W(Q_j) - h b_s W(q1)           p1 = M u1                                             (D17)
-inline bool step(const Parameters& parameters, real h, State& x) {
+static inline bool step(const Parameters& parameters, real h, State& x) {
     real u[n], v[n], Q[s][n], W[s][n];
     velocity(parameters, x.p, u);
     minus_acceleration(parameters, x.t, x.q, W[0]);
@@ -70,7 +70,7 @@ inline bool step(const Parameters& parameters, real h, State& x) {
 const char* const explicit_step = R"(
 // One step of length h from x, by kicks and drifts in turn (D40). False: it does not end at finite numbers; x is then
 // what it was.
-inline bool step(const Parameters& parameters, real h, State& x) {
+static inline bool step(const Parameters& parameters, real h, State& x) {
     State end = x;
     real u[n], W[n];
     velocity(parameters, x.p, u);
@@ -92,7 +92,7 @@ inline bool step(const Parameters& parameters, real h, State& x) {
 // The step of any Lagrangian: all control points by Newton's iteration.
 const char* const general_step = R"(
 // A x = y, by Gaussian elimination with partial pivoting; y becomes x. False: A is singular.
-inline bool solve(int size, real* A, real* y) {
+static inline bool solve(int size, real* A, real* y) {
     for (int k = 0; k < size; ++k) {
         int pivot = k;
         for (int i = k + 1; i < size; ++i)
@@ -114,7 +114,7 @@ inline bool solve(int size, real* A, real* y) {
 }
 
 // The velocity that belongs to p: Newton's iteration for dL/dv(q, v) = p, from the velocity given (D27).
-inline bool velocity(const Parameters& parameters, real t, const real* q, const real* p, real* v) {
+static inline bool velocity(const Parameters& parameters, real t, const real* q, const real* p, real* v) {
     real change = std::numeric_limits<real>::infinity();
     for (int iteration = 0; iteration < 100; ++iteration) {
         real z[Z], g[Z], H[Z * Z], M[n * n], d[n];
@@ -141,7 +141,7 @@ inline bool velocity(const Parameters& parameters, real t, const real* q, const 
 //   0 = sum_i b_i (D_ij L_v(i) + h B_ij L_q(i)) + delta_j0 p,    j = 0 ... m - 1;   unknown: X_1 ... X_m       (D28)
 //   q1 = X_m,   p1 = p + h sum_i b_i L_q(i)                                                                    (D29)
 // by Newton's iteration. False: it did not converge, or the step does not end at finite numbers; x is then what it was.
-inline bool step(const Parameters& parameters, real h, State& x) {
+static inline bool step(const Parameters& parameters, real h, State& x) {
     constexpr int m = controls - 1, N = n * m;
     real X[controls][n], g[nodes][Z], J[N * N], d[N];
     State end = x;
@@ -196,22 +196,22 @@ inline bool step(const Parameters& parameters, real h, State& x) {
 
 const char* const helpers = R"(
 // The larger one, or not a number.
-inline real larger(real one, real other) { return one >= other || std::isnan(one) ? one : other; }
+static inline real larger(real one, real other) { return one >= other || std::isnan(one) ? one : other; }
 // The change of a number; what it is measured against is at least a small part of the largest of its kind, whose
 // rounding it gets.
-inline real relative_change(real next, real last, const real* all) {
+static inline real relative_change(real next, real last, const real* all) {
     real largest = 0;
     for (int k = 0; k < n; ++k) largest = larger(largest, std::fabs(all[k]));
     const real size = std::fabs(next) + std::fabs(last) + small_part * largest;
     return next == last ? 0 : std::fabs(next - last) / size;
 }
 // A step later; what rounding leaves out of the time is kept beside it, else it would add up.
-inline void add_time(real h, State& x) {
+static inline void add_time(real h, State& x) {
     const real step = h + x.t_rest, sum = x.t + step;
     x.t_rest = step - (sum - x.t);
     x.t = sum;
 }
-inline bool is_finite(const State& x) {
+static inline bool is_finite(const State& x) {
     bool all = std::isfinite(x.t);
     for (int k = 0; k < n; ++k) all = all && std::isfinite(x.q[k]) && std::isfinite(x.p[k]);
     return all;
@@ -389,7 +389,7 @@ private:
             list += ", " + (mentions(body, argument.substr(last + 1)) ? argument : type);
         }
         return "\n" + wrapped("// " + comment, "// ") +
-               wrapped(fmt::format("inline {} {}({}) {{", result, name, list), "        ") + body + "}\n";
+               wrapped(fmt::format("static inline {} {}({}) {{", result, name, list), "        ") + body + "}\n";
     }
 
     // g and the whole matrix H, of which most may be zero.
@@ -414,11 +414,11 @@ private:
         if (!is_general())
             return function("H(q, p) = p^T M^-1 p / 2 + V(q) (D3).", "real", "energy",
                             {"real time", "const real* q", "const real* p"}, "energy") +
-                   "inline real energy(const Parameters& parameters, const State& x) { return energy(parameters, x.t, "
+                   "static inline real energy(const Parameters& values, const State& x) { return energy(values, x.t, "
                    "x.q, x.p); }\n";
         return function("H = v . dL/dv - L (D26).", "real", "energy",
                         {"real time", "const real* q", "const real* velocity"}, "energy") +
-               "inline real energy(const Parameters& parameters, const State& x) { return energy(parameters, x.t, x.q, "
+               "static inline real energy(const Parameters& values, const State& x) { return energy(values, x.t, x.q, "
                "x.v); }\n";
     }
 

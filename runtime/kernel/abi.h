@@ -73,6 +73,7 @@ typedef struct lobatto_advance {
      * and events of the chain's last step are told beyond it too: no later call tells them. */
     double interval, end;
     int32_t chain_records; /* 1: the states of the chain are rows too */
+    void* chain;           /* of kernels with a clock: room for a row, the chain's last state; null: it is not told */
     double* cuts;          /* room for the times at which walls and switches cut steps; null: they are not told */
     int64_t cut_capacity;  /* at least LOBATTO_CUTS_OF_STEP; when fewer are left, `advance` returns early */
     /* out */

@@ -101,7 +101,7 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
             if (request.arrivals.interval != 0) {
                 why =
                     "the clock comes to 0 along the step, or so near to it that time stands still or the energy is "
-                    "lost";
+                    "lost, as where a motion falls into a singularity";
                 advice = "a clock that is positive wherever the motion goes, or " + smaller;
                 break;
             }

@@ -52,6 +52,7 @@ public:
             const double error = std::fabs(result_.energy_error_final);
             if (!(error <= result_.energy_error_largest)) result_.energy_error_largest = error;
         }
+        if (count > 0) last_time_ = whole[static_cast<std::size_t>(count - 1) * columns * parts_];
         if (!has_energy()) result_.energy_error_final = result_.energy_error_largest = std::nan("");
         if (!request_.sink || count == 0) return;
         Records records{whole.data(), has_energy() ? energies_.data() : nullptr, count, static_cast<int>(columns)};
@@ -69,6 +70,8 @@ public:
         request_.sink(records);
     }
 
+    // But for rounding it is the time of the last row.
+    bool has_kept(double time) const { return std::fabs(time - last_time_) <= same_time * std::fabs(time); }
     void keep_last() {
         Parts row, q, p;
         stepper_.state(row, q, p);
@@ -78,6 +81,7 @@ public:
     }
 
 private:
+    static constexpr double same_time = 0x1p-50;
     bool has_energy() const { return stepper_.kernel()->has_energy != 0; }
 
     void energy(const double* time, const double* q, const double* p, double* energy) {
@@ -112,6 +116,7 @@ private:
     const TrajectoryRequest& request_;
     TrajectoryResult& result_;
     std::size_t n_, parts_;
+    double last_time_ = std::nan("");
     Parts energy_start_, energies_, rows_, rounded_energies_, beside_;
 };
 
@@ -192,7 +197,7 @@ void end_at_stop(NumberStepper& stepper, const TrajectoryRequest& request, std::
         add(result, call);
         keeper.keep(records, call.records_written, request.dense);
     }
-    keeper.keep(stop, 1, 0, true);
+    if (!keeper.has_kept(result.time)) keeper.keep(stop, 1, 0, true);  // a stop at the end of a step is its row
 }
 
 constexpr int most_halvings = 14;    // of a step that could not be taken
@@ -221,23 +226,21 @@ std::int64_t records_of_call(const Kernel& kernel, const TrajectoryRequest& requ
            rows_of_step;
 }
 
-// Of a motion with a clock, the state of its chain that was recorded last: one that fails went on from there, not from
-// the last arrival.
+// Of a motion with a clock, the last state of its chain: one that fails went on from there, not from the last arrival.
 class LastOfChain {
 public:
-    explicit LastOfChain(std::size_t parts) : parts_(parts) {}
+    LastOfChain(const Kernel& kernel, const TrajectoryRequest& request)
+        : request_(request), row_(kernel->clocked != 0 ? 1 + 2 * request.q.size() : 0) {}
 
-    void look(const TrajectoryRequest& request, const NumberStepper::Parts& records, std::int64_t count,
-              TrajectoryResult& result) {
-        const std::ptrdiff_t n = std::ssize(result.q), width = (1 + 2 * n) * static_cast<std::ptrdiff_t>(parts_);
-        const auto end = records.begin() + count * width;
-        if (count > 0) row_ = rounded({end - width, end}, parts_);
+    void ask(lobatto_advance& call) { call.chain = row_.empty() ? nullptr : row_.data(); }
+    void look(TrajectoryResult& result) {
         if (row_.empty()) return;
-        if (result.status == LOBATTO_OK && stands_still(result, request)) result.status = LOBATTO_TIME_STANDS_STILL;
-        if (result.status == LOBATTO_OK) return;
+        if (result.status == LOBATTO_OK && stands_still(result)) result.status = LOBATTO_TIME_STANDS_STILL;
+        if (result.status == LOBATTO_OK || result.status == LOBATTO_STOPPED) return;
+        const auto middle = row_.begin() + 1 + std::ssize(result.q);
         result.time = row_[0];
-        result.q.assign(row_.begin() + 1, row_.begin() + 1 + n);
-        result.p.assign(row_.begin() + 1 + n, row_.end());
+        result.q.assign(row_.begin() + 1, middle);
+        result.p.assign(middle, row_.end());
     }
 
 private:
@@ -246,18 +249,18 @@ private:
 
     // A clock that comes to 0 in a finite time lets its steps pass ever less of it. At every doubling of the steps:
     // whether the rest of the way would take more than `hopeless` times as many as the last half of them.
-    bool stands_still(const TrajectoryResult& result, const TrajectoryRequest& request) {
-        if (!request.arrivals.keeps_chain || result.chain_steps < next_look_) return false;
-        const double end = request.time + static_cast<double>(request.steps) * request.arrivals.interval,
-                     passed = std::fabs(row_[0] - time_looked_), left = std::fabs(end - row_[0]);
+    bool stands_still(const TrajectoryResult& result) {
+        if (result.chain_steps < next_look_) return false;
+        const double end = time_after(request_, request_.steps), passed = std::fabs(row_[0] - time_looked_),
+                     left = std::fabs(end - row_[0]);
         const bool is_later = next_look_ > first_look;
         time_looked_ = row_[0];
         next_look_ = 2 * result.chain_steps;
         return is_later && left > hopeless * passed;
     }
 
-    std::size_t parts_;
-    std::vector<double> row_;  // t, q, p
+    const TrajectoryRequest& request_;
+    std::vector<double> row_;  // t, q, p; clocks are of kernels in double
     std::int64_t next_look_ = first_look;
     double time_looked_ = 0;
 };
@@ -307,7 +310,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
     NumberStepper::Parts records, events, time;
     const std::int64_t event_rows =
         request.events && kernel->events > 0 ? std::max<std::int64_t>(rows_at_once, kernel->events_of_step) : 0;
-    LastOfChain last_of_chain(parts);
+    LastOfChain last_of_chain(kernel, request);
     Pace pace;
     Clock::time_point last_progress = Clock::now();
     while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
@@ -317,6 +320,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
             break;
         }
         lobatto_advance call = call_for(request, rows, event_rows);
+        last_of_chain.ask(call);
         call.steps = std::min(pace.block(), request.steps - result.steps_done);
         const Clock::time_point start = Clock::now();
         const double processor_start = processor_seconds();
@@ -328,7 +332,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         result.time = time[0];
         result.q = rounded(q, parts);
         result.p = rounded(p, parts);
-        if (kernel->clocked != 0) last_of_chain.look(request, records, call.records_written, result);
+        last_of_chain.look(result);
         result.events += call.events_written;
         if (call.events_written > 0) {
             const std::vector<double> found = rounded(events, parts);

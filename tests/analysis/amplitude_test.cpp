@@ -69,6 +69,12 @@ TEST_CASE("a coordinate in a far larger unit is lost where it is lost in any oth
         CHECK(done.exit_code == 3);
         CHECK(test::contains(done.out, "as large as the motion itself from t = "));
     }
+    // A start of 1e-13 is meant, also where nothing else tells its unit.
+    const MeasuredScene tiny(
+        "lagrangian = \"x'^2/2 - x^2/2 + y'^2/2 - 225*y^2/2\"\n[coordinates]\n"
+        "x = { position = 1, velocity = 0 }\ny = { position = 1e-13, velocity = 0 }\n"
+        "[method]\npoints = 2\n[run]\nstep = 0.1\nuntil = 20\n");
+    CHECK(tiny.run().exit_code == 3);
     // What rounding alone moves is none, however heavy.
     const MeasuredScene heavy(
         "lagrangian = \"x'^2/2 - x^2/2 + M*(y'^2/2 - y*(0.3*cos(x)^2 + 0.3*sin(x)^2 - 0.3))\"\n"

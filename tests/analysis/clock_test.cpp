@@ -326,6 +326,12 @@ TEST_CASE("a motion that rounding or the step would throw back where the clock i
                 worst = std::fmax(worst, std::fabs(row[1] - std::cos(row[0])));
             CHECK(worst < 1e-4);
         }
+    // The place is that of the clock's last step, also where few states are kept.
+    finished("x^2", 0.1);
+    const test::Finished rarely = test::run(
+        {LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet", "--every", "1.5"});
+    CHECK(rarely.exit_code == 3);
+    CHECK_MESSAGE(rarely.err.find("after t = 1.5707") != std::string::npos, rarely.err);
     // Clocks that become small, and stay above 0.
     for (const std::string clock : {"x^2 + 1e-6", "x + 1.001"}) {
         INFO(clock);

@@ -181,6 +181,22 @@ TEST_CASE("a parameter set between steps acts from the next step on, as a fresh 
           "unknown parameter 'omga'; declared: m, omega. Did you mean 'omega'?");
 }
 
+TEST_CASE("there is no tangent of a step that a wall cuts, and names of elements are known in both forms") {
+    const lob::Scene scene = lob::Scene::from_text(
+        "lagrangian = \"y'^2/2 - g[1]*y - g[2]*y^2/2\"\n[coordinates]\ny = { position = 1, velocity = 0 }\n"
+        "[parameters]\ng = [9.81, 0]\n[impacts]\nfloor = { when = \"y = 0 falling\", restitution = 0.8 }\n"
+        "[run]\nstep = 0.1\nuntil = 1\n",
+        "ball.toml");
+    lob::Stepper stepper(lob::compile(scene));
+    CHECK(stepper.parameter("g[1]") == stepper.parameter("g_1"));
+    stepper.set("g[2]", 1);
+    CHECK(stepper.parameter("g_2") == 1);
+    CHECK(stepper.tangent().size() == 4);
+    stepper.advance(4);  // to 0.4 of 0.45
+    CHECK(lobatto::test::contains(lobatto::test::message_of<lob::ComputationError>([&] { stepper.tangent(); }),
+                                  "cuts the step from here"));
+}
+
 TEST_CASE("the tangent of a step is symplectic") {
     lob::Stepper stepper(lob::compile(lob::Scene(scenes + "pendulum.toml")));
     const std::vector<double> T = stepper.tangent();

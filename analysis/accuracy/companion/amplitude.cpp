@@ -16,6 +16,7 @@ constexpr double displaced = 0.01;  // of its amplitude, at the start: what move
 // Of the largest place of all: what is left of rounding where a constraint holds a coordinate at 0. Newton's iteration
 // squares it each time; a motion that small beside others is none.
 constexpr double held_at_zero = 0x1p-100;
+constexpr double many_roundings = 0x1p-45;  // of the largest amplitude: what starts with more was meant to
 constexpr std::size_t first_compared = 16;  // comparisons: by then other motions are known, if steps are of any use
 
 }  // namespace
@@ -73,8 +74,10 @@ void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons, c
     const auto is_displaced = [&](std::size_t i) {
         return start[i] != 0 && std::fabs(start[i]) >= displaced * amplitudes[i];
     };
+    const auto is_above_rounding = [&](std::size_t i) { return amplitudes[i] > many_roundings / noise * levels[i]; };
     const auto is_of_another_unit = [&](std::size_t k) {
-        return products[k] > smallest && (is_displaced(k) || is_displaced(n + k));
+        return (is_displaced(k) && (products[k] > smallest || is_above_rounding(k))) ||
+               (is_displaced(n + k) && (products[k] > smallest || is_above_rounding(n + k)));
     };
     for (std::size_t i = 0; i < amplitudes.size(); ++i) {
         if (!(amplitudes[i] > 0 && amplitudes[i] < levels[i] && !is_of_another_unit(i % n))) continue;

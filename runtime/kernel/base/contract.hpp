@@ -180,8 +180,8 @@ struct Motion {
     }
 };
 
-// One trajectory of kernel K. Usage: prepare, start, then step as often as wanted. Not thread-safe; copy freely. A step
-// that fails leaves the state of the last good one.
+// One trajectory of kernel K. Usage: prepare, start (anew after another prepare, which changes h), then step as often
+// as wanted. Not thread-safe; copy freely. A step that fails leaves the state of the last good one.
 template <class K, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct Stepper;
 

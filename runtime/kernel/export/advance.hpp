@@ -83,7 +83,9 @@ struct Advance {
         return stops_beyond ? Status::ok : status;
     }
     static void put_row(real time, const real* q, const real* p, lobatto_advance& call) {
-        real* const row = next_row(call);
+        put_state(time, q, p, next_row(call));
+    }
+    static void put_state(real time, const real* q, const real* p, real* row) {
         row[0] = time;
         for (int k = 0; k < n; ++k) {
             row[1 + k] = q[k];
@@ -93,10 +95,13 @@ struct Advance {
 
     template <class AnyWatch>
     static Status take_steps(S& stepper, lobatto_advance& call, AnyWatch* watch) {
-        if constexpr (is_clocked<K>())
-            return take_intervals(stepper, call, watch);
-        else
+        if constexpr (is_clocked<K>()) {
+            const Status status = take_intervals(stepper, call, watch);
+            if (call.chain != nullptr) put_state(stepper.now.time, stepper.q, stepper.p, out(call.chain));
+            return status;
+        } else {
             return take_equal_steps(stepper, call, watch);
+        }
     }
     template <class AnyWatch>
     static Status take_equal_steps(S& stepper, lobatto_advance& call, AnyWatch* watch) {

@@ -90,9 +90,14 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         for (int k = 0; k < n; ++k) p_of_start[k] = p[k];
         const Status status = Chain::step();
         if (status != Status::ok) return status;
-        if (!is_ahead(elapsed) || now.time + elapsed == now.time) return Status::time_stands_still;
-        if (small_clock.is_small(elapsed / step_size) && !small_clock.keeps_energy(*this, q, p))
+        if (!is_ahead(elapsed) || now.time + elapsed == now.time ||
+            (small_clock.is_small(elapsed / step_size) && !small_clock.keeps_energy(*this, q, p))) {
+            for (int k = 0; k < n; ++k) {
+                q[k] = q_before[k];
+                p[k] = p_of_start[k];
+            }
             return Status::time_stands_still;
+        }
         for (int k = 0; k < n; ++k) p_before[k] = p_of_start[k];
         before = now;
         now.add(elapsed);

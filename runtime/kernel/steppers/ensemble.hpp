@@ -29,12 +29,21 @@ inline void set_coefficients(typename K::template CoefficientsOf<T>& all, int la
     }
 }
 
+// Whether lanes can follow the motion: walls, switches and constraints are followed by one trajectory at a time.
+template <class K>
+constexpr bool is_for_lanes() {
+    if constexpr (K::events > 0)
+        return constraints_of<K>() == 0 && K::impacts == 0 && K::switches == 0;
+    else
+        return constraints_of<K>() == 0;
+}
+
 // How many of `trajectories` stand side by side: a register of each value; two, which hide each other's latency, where
 // one or two coordinates leave room for them. None where the lanes serve a single step better.
 template <class K>
 constexpr int ensemble_lanes(int trajectories) {
     constexpr int native = native_lanes<typename K::real>;
-    if (native == 1 || !K::any_number || is_clean<K>() || is_clocked<K>()) return 0;
+    if (native == 1 || !K::any_number || is_clean<K>() || is_clocked<K>() || !is_for_lanes<K>()) return 0;
     if constexpr (K::form == Form::separable) {
         if (K::neighbours) return moves_immediately<K>() && trajectories >= native ? native : 0;
     }
@@ -63,6 +72,8 @@ struct ClockedEnsemble;
 
 template <class K, int width>
 struct Ensemble {
+    static_assert(is_for_lanes<K>(), "walls, switches and constraints: take one stepper for each trajectory");
+
     using real = typename K::real;
     using T = Pack<real, width>;
     using ActiveMask = decltype(T() < T());

@@ -303,3 +303,20 @@ TEST_CASE("what many digits cannot do is refused") {
     CHECK(refusal({"emit", oscillators, "--numbers", "50 digits", "--plain"}).find("knows no numbers in 50 digits") !=
           std::string::npos);
 }
+
+TEST_CASE("powers of numbers and angles of numbers have as many digits") {
+    if (!has_mpfr()) return;
+    const Digits place;
+    const auto end = [&](const std::string& term, const std::string& numbers) {
+        test::write_text(place.file("scene.toml"),
+                         fmt::format("lagrangian = \"x'^2/2 - x^2/2 - 0.1*{}\"\n[coordinates]\n"
+                                     "x = {{ position = 1, velocity = 0 }}\n[method]\n"
+                                     "points = 8\n[run]\nstep = 0.1\nuntil = 1\n",
+                                     term));
+        return std::stod(place.end_of({place.file("scene.toml"), "--numbers", numbers})[1]);
+    };
+    for (const char* term : {"2^x", "atan2(x, 2)", "atan2(2, x)"}) {
+        CAPTURE(term);
+        CHECK(std::fabs(end(term, "25 digits") - end(term, "double")) < 1e-13);
+    }
+}

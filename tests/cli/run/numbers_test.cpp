@@ -249,3 +249,30 @@ TEST_CASE("verify proves the steps of a scene in its own numbers beside those in
         CHECK_FALSE(test::contains(done.out, "FAILED"));
     }
 }
+
+TEST_CASE("constants of pairs stand beside numbers of any kind, also where Jacobians are in double") {
+    const Place place;
+    test::write_text(place.file("pairs.toml"),
+                     "lagrangian = \"\"\"sum(i = 1 .. n, x[i]'^2)/2 - sum(i = 1 .. n, sum(j = i + 1 .. n, "
+                     "i*cos(x[i] - x[j])))\"\"\"\n[coordinates]\nx = { count = \"n\", position = \"0.3*sin(i)\", "
+                     "velocity = 0 }\n[parameters]\nn = { value = 12, constant = true }\n[method]\npoints = 10\n[run]\n"
+                     "step = 0.01\nuntil = 0.1\n");
+    const auto end = [&](const std::string& numbers) {
+        const test::Finished done =
+            place.run({"run", place.file("pairs.toml"), "--numbers", numbers, "-o", place.file("pairs.csv")});
+        REQUIRE_MESSAGE(done.exit_code == 0, done.err);
+        return test::read_trajectory(place.file("pairs.csv")).rows.back();
+    };
+    const std::vector<double> high = end("double-double"), plain = end("double");
+    for (std::size_t k = 0; k < plain.size(); ++k) CHECK(std::fabs(high[k] - plain[k]) < 1e-11);
+}
+
+TEST_CASE("a closed solution in double is no measure of finer numbers") {
+    const Place place;
+    const std::string pendulum = LOBATTO_SOURCE_DIR "/scenes/pendulum.toml";
+    const auto says = [&](const std::string& numbers) {
+        return place.run({"run", pendulum, "--numbers", numbers, "--until", "1", "-o", place.file("run.csv")}).out;
+    };
+    CHECK(test::contains(says("double"), "position error"));
+    CHECK_FALSE(test::contains(says("double-double"), "position error"));
+}

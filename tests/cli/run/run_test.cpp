@@ -777,3 +777,37 @@ TEST_CASE("an error above a hundredth of the amplitude is warned of, also with -
     CHECK(test::contains(done.err, "lobatto: warning: "));
     CHECK(test::contains(done.err, "of the amplitude"));
 }
+
+TEST_CASE("a stop at the end of a step is the row of that step") {
+    const Place place;
+    test::write_text(place.file("free.toml"),
+                     "lagrangian = \"x'^2/2\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n[run]\n"
+                     "step = 0.125\nuntil = 3\nstop = \"x = 1\"\n");
+    REQUIRE(place.run({place.file("free.toml"), "-o", place.file()}).exit_code == 0);
+    const auto rows = test::read_trajectory(place.file()).rows;
+    CHECK(rows.size() == 9);
+    CHECK(rows.back()[0] == 1);
+    CHECK(rows[rows.size() - 2][0] == 0.875);
+}
+
+TEST_CASE("values on the command line decide where those of the scene allow no start") {
+    const Place place;
+    const auto run = [&](const std::string& text, const std::string& value) {
+        test::write_text(place.file("scene.toml"), text);
+        return place.run({place.file("scene.toml"), "-o", place.file(), "--set", value});
+    };
+    const std::string rod =
+                          "lagrangian = \"(x'^2 + y'^2)/2 - 9.81*y\"\n[coordinates]\n"
+                          "x = { position = 0.6, velocity = 0 }\ny = { position = -0.8, velocity = 0 }\n[constraints]\n"
+                          "rod = \"x^2 + y^2 = l^2\"\n[parameters]\nl = 2\n[run]\nstep = 0.01\nuntil = 0.1\n",
+                      wall =
+                          "lagrangian = \"y'^2/2 - 9.81*y\"\n[coordinates]\ny = { position = 1, velocity = 0 }\n"
+                          "[impacts]\nfloor = { when = \"y = b falling\", restitution = 0.5 }\n[parameters]\nb = 2\n"
+                          "[run]\nstep = 0.01\nuntil = 0.5\n";
+    CHECK(run(rod, "l=1").exit_code == 0);
+    CHECK(test::contains(run(rod, "l=1.5").err, "its left side minus its right side is -1.25"));
+    CHECK(run(rod, "l=2").exit_code == 2);
+    CHECK(run(wall, "b=0.2").exit_code == 0);
+    CHECK(run(wall, "b=1.5").exit_code == 2);
+    CHECK(run(wall, "b=2").exit_code == 2);
+}

@@ -255,6 +255,50 @@ TEST_CASE("two standalone headers can be included in one program" * doctest::tes
         "");
 }
 
+TEST_CASE("kernels of one name in two files of a program stay two, in both forms, without optimisation") {
+    const test::TemporaryFolder folder;
+    EmitOptions options;
+    options.support_text = [](const auto& parts) { return support_text(parts); };
+    const SceneText arm{"arm", "x'^2/2 + cos(x)", {"x"}, {}};
+    std::string declarations;
+    std::vector<std::string> command{"g++", "-std=c++17", "-O0", "-o", folder / "program", folder / "program.cpp"};
+    for (const auto& [points, letter] : {std::pair{2, 'a'}, std::pair{5, 'b'}}) {
+        const Derivation derivation = derivation_of(arm, points);
+        const std::string kernel_file = fmt::format("kernel_{}", letter), plain_file = fmt::format("plain_{}", letter);
+        test::write_text(folder / (kernel_file + ".hpp"), emit(derivation, options).header);
+        test::write_text(folder / (plain_file + ".hpp"), emit_plain(derivation.scene, Precision::double_).header);
+        test::write_text(folder / (kernel_file + ".cpp"),
+                         fmt::format("#include \"{0}.hpp\"\n"
+                                     "double {0}() {{\n    lobatto::Stepper<lobatto::kernels::arm> stepper;\n"
+                                     "    const double q = 1, p = 0;\n    stepper.prepare({{}}, 0.5);\n"
+                                     "    stepper.start(0, &q, &p);\n    stepper.step();\n"
+                                     "    return stepper.q[0];\n}}\n",
+                                     kernel_file));
+        test::write_text(folder / (plain_file + ".cpp"),
+                         fmt::format("#include \"{0}.hpp\"\n"
+                                     "double {0}() {{\n    namespace motion = lobatto::plain::arm;\n"
+                                     "    const motion::Parameters parameters;\n"
+                                     "    motion::State x = motion::start(parameters);\n"
+                                     "    motion::step(parameters, 0.5, x);\n    return x.q[0];\n}}\n",
+                                     plain_file));
+        for (const std::string& file : {kernel_file, plain_file}) {
+            declarations += fmt::format("double {}();\n", file);
+            command.push_back(folder / (file + ".cpp"));
+        }
+    }
+    test::write_text(
+        folder / "program.cpp",
+        "#include <cmath>\n" + declarations +
+            "int main() {\n    const auto same = [](double x, double y) { return std::fabs(x - y) < 1e-12; };\n"
+            "    return (same(kernel_a(), kernel_b()) ? 1 : 0) + (same(plain_a(), plain_b()) ? 2 : 0) +\n"
+            "           (same(kernel_a(), plain_a()) && same(kernel_b(), plain_b()) ? 0 : 4);\n}\n");
+    REQUIRE(test::run(command).err == "");
+    CHECK(test::run({folder / "program"}).exit_code == 0);
+    std::reverse(command.begin() + 6, command.end());
+    REQUIRE(test::run(command).err == "");
+    CHECK(test::run({folder / "program"}).exit_code == 0);
+}
+
 TEST_CASE("names that the emitted code uses itself compile" * doctest::test_suite("slow")) {
     check_compiles({"collide",
                     "q1*t1'^2/2 + k1'^2/2 - V*sin(t1)*cos(t1)*z^2 - inverse_m*m*k1^3*t1^2 - p*k*S*h2_A22*exp(k1) - "
