@@ -108,6 +108,15 @@ void apply(const Overrides& overrides, Scene& scene) {
     if (overrides.every) keep_every(*overrides.every, scene);
 }
 
+std::function<Scene()> with_values(const Scene& scene, const Overrides& overrides) {
+    if (overrides.set.empty()) return {};
+    return [scene, values = Overrides{overrides.set, "", "", std::nullopt}] {
+        Scene changed = scene;
+        apply(values, changed);
+        return changed;
+    };
+}
+
 std::int64_t kept_by_sweeps(const Overrides& overrides, const Scene& scene) {
     if (!overrides.every) return 0;
     return scene.clock ? 1 : static_cast<std::int64_t>(*overrides.every);

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,9 @@ Text text_of(const std::string& argument, std::size_t begin, std::size_t end = s
 
 // Throws InputError with the place in the argument.
 void apply(const Overrides& overrides, Scene& scene);
+
+// The scene with the values of parameters alone; empty where none are set.
+std::function<Scene()> with_values(const Scene& scene, const Overrides& overrides);
 
 // A sweep keeps one of so many states; 0: the last one alone. With a clock those at the scene's times are kept.
 std::int64_t kept_by_sweeps(const Overrides& overrides, const Scene& scene);

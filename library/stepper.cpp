@@ -72,7 +72,7 @@ Kernel compile(const Scene& scene, const Settings& settings) {
                 changed.path, precision_name(changed.method.numbers)));
         changed.outputs.energy = true;
         const Overrides overrides = overrides_of(settings);
-        const DerivedKernel derived = derived_kernel(changed, {}, nullptr, overrides);
+        const DerivedKernel derived = derived_kernel(changed, {}, nullptr, with_values(changed, overrides));
         apply(overrides, changed);
         if (!overrides.set.empty()) check_values(changed);
         const Steps steps = steps_of(changed, overrides);

@@ -109,13 +109,16 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, s
                                  precision_name(scene.method.numbers) +
                                  "\"; remove the clock, or give --numbers double");
     const Precision numbers = scene.method.numbers;
-    const DerivedKernel derived = derived_kernel(scene, {numbers, general, EnergyWatch::can_watch}, nullptr, overrides);
+    const DerivedKernel derived =
+        derived_kernel(scene, {numbers, general, EnergyWatch::can_watch}, nullptr, with_values(scene, overrides));
     const auto source_in = [&](Precision others, const Method& method) {
         Scene beside = scene;
         beside.method = method;
         const bool is_known = method.arithmetic == scene.method.arithmetic;
         const KernelWish wish{others, general, EnergyWatch::can_watch};
-        return derived_kernel(beside, wish, is_known ? derived.derivation.get() : nullptr, overrides).source;
+        return derived_kernel(beside, wish, is_known ? derived.derivation.get() : nullptr,
+                              with_values(beside, overrides))
+            .source;
     };
     KernelSource in_double, in_finer;
     if (numbers != Precision::double_) in_double = source_in(Precision::double_, scene.method);

@@ -138,17 +138,13 @@ DerivedKernel kept_or_derived(const Scene& scene, const KernelWish& wish, const 
 }  // namespace
 
 DerivedKernel derived_kernel(const Scene& scene, const KernelWish& wish, const Derivation* known,
-                             const Overrides& overrides) {
+                             const std::function<Scene()>& with_values) {
     try {
         return kept_or_derived(scene, wish, known);
     } catch (const InputError&) {
-        if (overrides.set.empty()) throw;
+        if (!with_values) throw;
     }
-    Scene changed = scene;
-    Overrides values;
-    values.set = overrides.set;
-    apply(values, changed);
-    return kept_or_derived(changed, wish, nullptr);
+    return kept_or_derived(with_values(), wish, nullptr);
 }
 
 }  // namespace lobatto

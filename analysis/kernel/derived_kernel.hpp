@@ -2,10 +2,10 @@
 // Derivations are kept like compiled kernels: the same scene is derived once.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
-#include "analysis/overrides.hpp"
 #include "generator/emit/kernel.hpp"
 #include "generator/mechanics/outline.hpp"
 
@@ -30,8 +30,8 @@ struct KernelWish {
 // Derives and emits, or finds what was kept of that: by the text of the scene and of its tables, its method and what it
 // keeps, and by the build of this program. `known`: a derivation of this very scene, if there is one.
 // Throws InputError; MachineError where there is no folder to keep things in.
-// `overrides`: their values of parameters decide where a start is no start with the scene's own.
+// `with_values`: the scene with other values of parameters, which decide where a start is none with its own.
 DerivedKernel derived_kernel(const Scene& scene, const KernelWish& wish, const Derivation* known = nullptr,
-                             const Overrides& overrides = {});
+                             const std::function<Scene()>& with_values = {});
 
 }  // namespace lobatto

@@ -190,7 +190,8 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
         Scene scene = starts_->with_settings(as_written_, first);
         if (!scene_.outputs.kept.empty()) scene.outputs.energy = true;
         const auto derived_in = [&](Precision numbers, const Derivation* derivation) {
-            return derived_kernel(scene, {numbers, false, EnergyWatch::can_watch}, derivation, values_of(first));
+            return derived_kernel(scene, {numbers, false, EnergyWatch::can_watch}, derivation,
+                                  with_values(scene, values_of(first)));
         };
         DerivedKernel derived = derived_in(method.numbers, nullptr);
         known.source = std::make_shared<const KernelSource>(std::move(derived.source));

@@ -25,10 +25,11 @@ struct Reason {
 Reason off_constraints(bool on_the_way) {
     if (on_the_way)
         return {
-            "after an impact, a switch or a new input the motion does not keep the constraints, or is behind a wall: a "
-            "reset leads elsewhere, an input has moved a wall past the motion, or the constraints have a corner there",
-            "a reset that keeps them, a restitution, which does, inputs that change less at a time, or constraints "
-            "without corners"};
+            "after an impact, a switch or a new value the motion does not keep the constraints, or is behind a wall: a "
+            "reset leads elsewhere, a wall was moved past the motion, the momenta do not fit other masses, or the "
+            "constraints have a corner there",
+            "a reset that keeps them, a restitution, which does, a value under [inputs] instead of [parameters], "
+            "inputs that change less at a time, or constraints without corners"};
     return {"the start does not keep the constraints, or is behind a wall",
             "positions and velocities that keep them, or assemble = true under [run] of a scene with constraints"};
 }
@@ -44,11 +45,13 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
             break;
         case LOBATTO_NOT_CONVERGED:
             why = fmt::format(
-                "the iteration for the positions inside the step did not converge: its last increment was {:.2g} "
-                "of the displacement "
-                "within the step. The step is too long for the forces met there, or the motion runs into a singularity "
-                "of the potential, or to a place where a mass vanishes",
-                result.increment_failed);
+                "the iteration for the positions inside the step did not converge{}. The step is too long for the "
+                "forces met there, or the motion runs into a singularity of the potential, or to a place where a mass "
+                "vanishes",
+                result.increment_failed > 0 ? fmt::format(": its last increment was {:.2g} of the displacement within "
+                                                          "the step",
+                                                          result.increment_failed)
+                                            : std::string());
             advice = smaller + more + ", or start elsewhere";
             break;
         case LOBATTO_NOT_FINITE:

@@ -253,10 +253,10 @@ private:
         if (result.chain_steps < next_look_) return false;
         const double end = time_after(request_, request_.steps), passed = std::fabs(row_[0] - time_looked_),
                      left = std::fabs(end - row_[0]);
-        const bool is_later = next_look_ > first_look;
+        const bool slows_down = next_look_ > first_look && passed < std::fabs(row_[0] - request_.time) / 4;
         time_looked_ = row_[0];
         next_look_ = 2 * result.chain_steps;
-        return is_later && left > hopeless * passed;
+        return slows_down && left > hopeless * passed;
     }
 
     const TrajectoryRequest& request_;

@@ -92,6 +92,38 @@ TEST_CASE("two impacts within a step do not hide the error of the flight between
     CHECK(printed < 2 * error);
 }
 
+TEST_CASE("switches that change little do not make the printed error larger, over many of them") {
+    const auto text = [](double step) {
+        return fmt::format(
+            "lagrangian = \"\"\"x'^2/2 + y'^2/2 - x^2/2 - 1.3*y^2/2 - 0.2*max(x - 0.3, 0)^2 - 0.3*max(y - 0.31, 0)^2\n"
+            "- 0.1*max(x + y, 0)^2\"\"\"\n[coordinates]\nx = {{ position = 1, velocity = 0 }}\n"
+            "y = {{ position = 0.7, velocity = 0.4 }}\n[method]\npoints = 4\n[run]\nstep = {}\nuntil = 9000\n",
+            step);
+    };
+    const MeasuredScene coarse(text(0.3)), fine(text(0.3 / 16));
+    const test::Finished finished = coarse.run();
+    REQUIRE(finished.exit_code == 0);
+    REQUIRE(fine.run({"--unmeasured"}).exit_code == 0);
+    const std::vector<double> end = coarse.end(), truth = fine.end();
+    const double error = std::fmax(std::fabs(end[1] - truth[1]), std::fabs(end[2] - truth[2])),
+                 printed = absolute_error(finished.out);
+    CAPTURE(error);
+    CHECK(printed > 0.5 * error);
+    CHECK(printed < 2 * error);
+}
+
+TEST_CASE("where parts of steps cannot start on a wall, whole ones measure the motion") {
+    const MeasuredScene box(
+        "lagrangian = \"x'^2/2 + y'^2/2\"\n[coordinates]\nx = { position = 1, velocity = -1 }\n"
+        "y = { position = 1.01, velocity = -1 }\n[impacts]\n"
+        "a = { when = \"x = 0 falling\", restitution = 1 }\nb = { when = \"y = 0 falling\", restitution = 1 }\n"
+        "c = { when = \"x = 2 rising\", restitution = 1 }\nd = { when = \"y = 2 rising\", restitution = 1 }\n"
+        "[method]\npoints = 3\n[run]\nstep = 0.07\nuntil = 400\n");
+    const test::Finished finished = box.run();
+    CHECK_MESSAGE(finished.exit_code == 0, finished.err);
+    CHECK(absolute_error(finished.out) < 1e-10);
+}
+
 TEST_CASE("in sweeps such a trajectory is measured by a companion of its own") {
     namespace lob = lobatto::api;
     for (const char* numbers : {"", "double-double"}) {
@@ -109,6 +141,14 @@ TEST_CASE("in sweeps such a trajectory is measured by a companion of its own") {
             CAPTURE(error);
             CHECK(result.error[i] > 0.5 * error);
             CHECK(result.error[i] < 2 * error);
+        }
+        // The end of the run cuts the contact off.
+        starts.columns["k"] = {1e3, 2e3, 3e3, 4e3};
+        const lob::Sweep cut_off =
+            lob::sweep(lob::Scene::from_text(on_springs(1, 0.1, 0.5), "springs.toml"), starts, options);
+        for (std::size_t i = 0; i < 4; ++i) {
+            CAPTURE(i);
+            CHECK(cut_off.error[i] > 0.5 * std::fabs(cut_off.q[i] - true_place(starts.columns["k"][i], 0.5)) / 0.5);
         }
     }
 }

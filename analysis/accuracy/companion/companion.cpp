@@ -20,7 +20,11 @@ constexpr std::int64_t most_comparisons = 256;
 constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for its amplitude, at least
 constexpr std::int64_t most_at_once = 65536;   // steps or arrivals, before it hears that nobody waits
 constexpr double short_run = 1;                // seconds: of these the companion always reaches the end
-constexpr double graded = 8;            // steps are at most this part of the distance to a pulse, or half of its width
+constexpr double graded = 8;  // steps are at most this part of the distance to a pulse, or half of its width
+constexpr double graded_at_contacts = 2;  // likewise; more of other steps would change their energy
+constexpr double much = 64;               // times the usual
+constexpr double most_tried = 1000;
+constexpr double parted = 1.999;        // of a step: what is shorter is not in two parts yet
 constexpr double finest = 0x1p-30;      // steps are never shorter than this part of those of the run
 constexpr double same_time = 0x1p-48;   // relative: times that differ by no more differ by rounding
 constexpr double same_as_rounded = 16;  // likewise, roundings of the kernel's numbers
@@ -34,6 +38,18 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 std::vector<double> joined(std::vector<double> q, const std::vector<double>& p) {
     q.insert(q.end(), p.begin(), p.end());
     return q;
+}
+
+// Whether a step is to be divided at one of these, in the order of time.
+bool is_near(const std::vector<Pulse>& pulses, double grading, double from, double step) {
+    const double begin = std::fmin(from, from + step), end = std::fmax(from, from + step), size = end - begin;
+    const auto first = std::lower_bound(pulses.begin(), pulses.end(), begin - grading * size,
+                                        [](const Pulse& pulse, double time) { return pulse.time < time; });
+    for (auto pulse = first; pulse != pulses.end() && pulse->time < end + grading * size; ++pulse) {
+        const double distance = std::fmax(0.0, std::fmax(begin - pulse->time, pulse->time - end));
+        if (size > std::fmax(pulse->width / 2, distance / grading)) return true;
+    }
+    return false;
 }
 
 }  // namespace
@@ -131,6 +147,11 @@ void Companion::start() {
     if (request_.steps > 0) thread_ = std::thread([this] { compute(); });
 }
 
+void Companion::compute_here() {
+    is_here_ = true;
+    compute();
+}
+
 struct Companion::Place {
     NumberStepper stepper;
     std::vector<double> time, step;  // step: zero before the first
@@ -141,15 +162,17 @@ struct Companion::Place {
     NearCuts cuts = {};
 
     struct State {
-        std::vector<double> time, q, p;
+        std::vector<double> time, step, q, p;
+        std::string memory;  // of the stepper: a start may be refused where the motion goes on, as on a wall
     };
     State before = {};  // the last step that was taken by itself
-    State state() const { return {time, q, p}; }
+    State state() const { return {time, step, q, p, stepper.memory()}; }
     void go_back(const State& to) {
         time = to.time;
+        step = to.step;
         q = to.q;
         p = to.p;
-        step.assign(step.size(), 0.0);
+        stepper.restore(to.memory);
     }
 
     // Steps of another size begin at this place.
@@ -175,14 +198,7 @@ struct Companion::Place {
 };
 
 bool Companion::is_near_pulse(double from, double step) const {
-    const double begin = std::fmin(from, from + step), end = std::fmax(from, from + step), size = end - begin;
-    const auto first = std::lower_bound(pulses_.begin(), pulses_.end(), begin - graded * size,
-                                        [](const Pulse& pulse, double time) { return pulse.time < time; });
-    for (auto pulse = first; pulse != pulses_.end() && pulse->time < end + graded * size; ++pulse) {
-        const double distance = std::fmax(0.0, std::fmax(begin - pulse->time, pulse->time - end));
-        if (size > std::fmax(pulse->width / 2, distance / graded)) return true;
-    }
-    return false;
+    return is_near(pulses_, graded, from, step) || (divides_ && is_near(contacts_, graded_at_contacts, from, step));
 }
 
 // A knot that the step crosses, not one at which it begins or ends but for rounding.
@@ -219,20 +235,68 @@ void Companion::take_finely(Place& place, double from, const std::vector<double>
 
 // One step; shorter ones in its place, if the motion met something narrow in it.
 void Companion::take_one(Place& place, double from, const std::vector<double>& step) {
-    const Place::State before = place.before = place.state();
+    place.before = place.state();
+    place.cuts.set_step(request_.step);
     place.cuts.begin(from == request_.time ? from : std::numeric_limits<double>::infinity());
     place.set_step(step, request_.whole_parameters);
     place.advance(1, request_.tolerance);
     if (place.status != LOBATTO_OK) return;
-    std::optional<Pulse> met = narrow_term(place, step);
-    if (!met) met = near_cuts(place, step);
-    if (!met || !can_halve(from, step.front())) return;
-    pulses_.insert(std::upper_bound(pulses_.begin(), pulses_.end(), *met,
-                                    [](const Pulse& a, const Pulse& b) { return a.time < b.time; }),
-                   *met);
-    if (!is_near_pulse(from, step.front())) return;  // but for rounding it was
-    place.go_back(before);
+    if (looks_at_usual_ && is_cut_ && std::isinf(place.cuts.last())) {
+        const std::vector<double> change = change_in_parts(place, step, 1, 2);
+        usual_change_.resize(change.size());
+        for (std::size_t i = 0; i < change.size(); ++i)
+            if (change[i] > usual_change_[i]) usual_change_[i] = change[i];
+        looks_at_usual_ = false;
+    }
+    const auto insert = [](std::vector<Pulse>& pulses, const Pulse& one) {
+        pulses.insert(std::upper_bound(pulses.begin(), pulses.end(), one,
+                                       [](const Pulse& a, const Pulse& b) { return a.time < b.time; }),
+                      one);
+    };
+    const std::optional<Pulse> term = narrow_term(place, step),
+                               contact = term ? std::nullopt : short_contact(place, step);
+    if (term)
+        insert(pulses_, *term);
+    else if (contact && matters(place, step, *contact))
+        insert(contacts_, *contact);
+    else
+        return;
+    if (!can_halve(from, step.front()) || !is_near_pulse(from, step.front())) return;
+    place.go_back(place.before);
     take_finely(place, from, step);
+}
+
+// What it changes in q and p to take so many steps, the last one and those after it, each in so many parts.
+std::vector<double> Companion::change_in_parts(Place& place, const std::vector<double>& step, int steps, int parts) {
+    const Place::State after = place.state();
+    const auto lead_to = [&](int count, const std::vector<double>& size) {
+        place.go_back(place.before);
+        place.set_step(size, request_.whole_parameters);
+        place.advance(count, request_.tolerance);
+        return rounded(joined(place.q, place.p), parts_);
+    };
+    const std::vector<double> whole = lead_to(steps, step);
+    std::vector<double> change = lead_to(steps * parts, times_fraction(step, 1, parts));
+    for (std::size_t i = 0; i < change.size(); ++i) change[i] = std::fabs(change[i] - whole[i]);
+    if (place.status != LOBATTO_OK) change.assign(change.size(), std::numeric_limits<double>::infinity());
+    place.status = LOBATTO_OK;
+    place.go_back(after);
+    return change;
+}
+
+// Whether parts of a contact lead elsewhere by much more than halves of steps do that nothing cuts. Where they do not,
+// whole steps are better: parts would only change the energy.
+bool Companion::matters(Place& place, const std::vector<double>& step, const Pulse& contact) {
+    if (usual_change_.empty()) return true;
+    const double size = std::fabs(step.front()), parts = std::ceil(2 * size / contact.width),
+                 steps =
+                     1 + std::ceil((std::fabs(contact.time - place.before.time.front()) + contact.width / 2) / size);
+    if (!(parts <= most_tried)) return true;
+    const std::vector<double> change =
+        change_in_parts(place, step, static_cast<int>(steps), static_cast<int>(parts) + 1);
+    for (std::size_t i = 0; i < change.size(); ++i)
+        if (!(change[i] <= much * usual_change_[i])) return true;
+    return false;
 }
 
 // That the motion met in the last step.
@@ -251,38 +315,44 @@ std::optional<Pulse> Companion::narrow_term(Place& place, const std::vector<doub
     return narrow_.on_the_way(begin, end);
 }
 
-// Two cuts that are nearer to one another than two steps, of the run and of this size; the first of them is in the last
-// step, or the start of the run. The steps after it are taken on trial; the end of the run counts as a cut.
-std::optional<Pulse> Companion::near_cuts(Place& place, const std::vector<double>& step) const {
+// Between two cuts that are nearer to one another than two steps of the run; the first of them is in the last step, or
+// the start of the run. The steps after it are taken on trial; the end of the run counts as a cut.
+std::optional<Pulse> Companion::short_contact(Place& place, const std::vector<double>& step) const {
     const double first = place.cuts.last();
-    if (!is_cut_ || !std::isfinite(first)) return std::nullopt;
-    const double widest = NearCuts::near * std::fmin(std::fabs(request_.step), std::fabs(step.front())),
+    if (!is_cut_ || !divides_ || !std::isfinite(first)) return std::nullopt;
+    const double longest = NearCuts::near * std::fabs(request_.step), size = std::fabs(step.front()),
                  end = time_after(request_, request_.steps);
     const Place::State after = place.state();
     while (place.cuts.last() == first && place.status == LOBATTO_OK &&
-           std::fabs(place.time.front() - first) <= widest) {
-        if (std::fabs(end - place.time.front()) < std::fabs(step.front()) / 2)
+           std::fabs(place.time.front() - first) <= longest) {
+        if (std::fabs(end - place.time.front()) < size / 2)
             place.cuts.observe(end);
         else
             place.advance(1, request_.tolerance);
     }
     place.status = LOBATTO_OK;
     place.go_back(after);
-    if (!(place.cuts.gap() < widest)) return std::nullopt;
-    return Pulse{place.cuts.middle(), place.cuts.gap()};
+    const double gap = place.cuts.gap();
+    if (!(gap < longest && gap < parted * size)) return std::nullopt;
+    return Pulse{place.cuts.middle(), gap};
+}
+
+std::vector<double> Companion::step_of(const Segment& part) const {
+    return is_clocked() ? as_parts({request_.step / ratio_of(part)}, parts_)
+                        : times_fraction(request_.whole_step, part.steps, part.taken);
 }
 
 void Companion::take(Place& place, const Segment& part) {
     const double from = time_after(request_, part.begin), size = request_.step / ratio_of(part);
-    const std::vector<double> whole_size =
-        is_clocked() ? as_parts({size}, parts_) : times_fraction(request_.whole_step, part.steps, part.taken);
+    const std::vector<double> whole_size = step_of(part);
     const std::int64_t piece = std::clamp<std::int64_t>(request_.steps / amplitude_looks, 1, most_at_once);
     std::int64_t done = 0;
     while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
         const double here = from + static_cast<double>(done) * size;
-        const bool looks = !is_clocked() && (is_cut_ || (!narrow_.empty() && looked_ < most_looked));
+        looks_at_usual_ = looks_at_usual_ || done == part.taken / 2;
+        const bool looks = !is_clocked() && ((is_cut_ && divides_) || (!narrow_.empty() && looked_ < most_looked));
         std::int64_t count = 0;
-        const bool is_even = pulses_.empty() && knots_.empty();
+        const bool is_even = pulses_.empty() && knots_.empty() && (contacts_.empty() || !divides_);
         while (!looks && count < std::min(piece, part.taken - done) &&
                (is_even || !needs_parts(here + static_cast<double>(count) * size, size)))
             count = is_even ? std::min(piece, part.taken - done) : count + 1;
@@ -330,10 +400,29 @@ void Companion::compute() {
             place.stepper.start(place.time, moved, place.p) == LOBATTO_OK)
             place.q = moved;  // else the start is at the edge of where the Lagrangian is real
     }
-    for (Segment part = segment(done); part.steps > 0; part = segment(++done)) {
+    // A start is refused at some states on a wall that the motion passes. So where parts of steps fail, the way is
+    // taken again in whole ones, from the last place where no new start is needed.
+    std::size_t whole_until = 0, safe = done;
+    Place::State safe_state = place.state();
+    for (Segment part = segment(done); part.steps > 0 && !(is_here_ && has_caught_up()); part = segment(++done)) {
+        if (is_cut_ && place.step == step_of(part)) {
+            safe = done;
+            safe_state = place.state();
+        }
+        divides_ = done >= whole_until;
         take(place, part);
         if (cancelled_) return;
         const std::lock_guard lock(mutex_);
+        if (place.status != LOBATTO_OK && is_cut_ && divides_) {
+            whole_until = done + 1;
+            companion_.resize(companion_.size() - (done - safe));
+            companion_ranges_.resize(companion_.size());
+            done = safe - 1;  // and on with the next one
+            place.status = LOBATTO_OK;
+            place.go_back(safe_state);
+            place.range = {};
+            continue;
+        }
         if (place.status != LOBATTO_OK) {
             stopped_ = place.time[0];
             break;
@@ -409,7 +498,7 @@ bool Companion::has_compared() const {
 std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
     const bool has_end = result.status == LOBATTO_OK && !result.interrupted && result.steps_done > 0;
     if (has_end) {
-        const bool begins_now = !thread_.joinable();  // there is one processor: it waited until now
+        const bool begins_now = !thread_.joinable() && !finished_;  // there is one processor: it waited until now
         if (begins_now) start();
         const auto now = std::chrono::steady_clock::now();
         const double longest = is_finer_ || result.seconds < short_run ? std::numeric_limits<double>::infinity()

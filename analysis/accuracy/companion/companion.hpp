@@ -59,6 +59,8 @@ public:
     void end();
     // Begins to compute. Before, `restore` may say what an earlier part of the run had.
     void start();
+    // Instead: computes in this thread, as far as the run was observed.
+    void compute_here();
     std::vector<double> save() const;
     // False: that part had no companion, or one in other numbers.
     bool restore(const std::vector<double>& saved);
@@ -87,12 +89,15 @@ private:
     bool is_clocked() const { return request_.arrivals.interval != 0; }
     double ratio_of(const Segment& part) const;
     void compute();
+    std::vector<double> step_of(const Segment& part) const;
     void take(Place& place, const Segment& part);
     // `step` has all digits: steps and the parts of them end at the times of the run.
     void take_finely(Place& place, double from, const std::vector<double>& step);
     void take_one(Place& place, double from, const std::vector<double>& step);
     std::optional<Pulse> narrow_term(Place& place, const std::vector<double>& step);
-    std::optional<Pulse> near_cuts(Place& place, const std::vector<double>& step) const;
+    std::vector<double> change_in_parts(Place& place, const std::vector<double>& step, int steps, int parts);
+    bool matters(Place& place, const std::vector<double>& step, const Pulse& contact);
+    std::optional<Pulse> short_contact(Place& place, const std::vector<double>& step) const;
     bool has_caught_up() const;
     bool has_compared() const;
     bool can_halve(double from, double step) const;
@@ -110,13 +115,17 @@ private:
     TrajectoryRequest request_;
     std::vector<int> groups_;
     int rows_a_step_;
-    std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
-    NarrowTerms narrow_;         // likewise, where the motion meets them
-    std::vector<double> knots_;  // of measured values in time, at which its steps end
-    std::int64_t looked_ = 0;    // at terms, along steps of the companion
-    bool is_driven_ = false;     // explicit time
-    bool is_cut_ = false;        // at walls and switches
-    std::int64_t stride_;        // steps of the run between comparisons
+    std::vector<Pulse> pulses_;         // which the steps of the run may miss: the companion's are fine there
+    NarrowTerms narrow_;                // likewise, where the motion meets them
+    std::vector<double> knots_;         // of measured values in time, at which its steps end
+    std::int64_t looked_ = 0;           // at terms, along steps of the companion
+    bool is_driven_ = false;            // explicit time
+    bool is_cut_ = false;               // at walls and switches
+    std::vector<Pulse> contacts_;       // between cuts that are near to one another
+    std::vector<double> usual_change_;  // of q and p, where a step that nothing cuts is halved
+    bool looks_at_usual_ = true;
+    bool divides_ = true;  // these into parts
+    std::int64_t stride_;  // steps of the run between comparisons
     std::int64_t seen_ = 0;
     std::vector<Point> run_;               // of the run, at comparisons
     Range range_;                          // of the run's kept states
@@ -125,6 +134,7 @@ private:
     std::vector<Range> companion_ranges_;  // on the way to each: the run may stop before the companion does
     std::optional<double> stopped_;        // where the companion stopped with another status than ok
     std::atomic<bool> cancelled_{false}, finished_{false};
+    bool is_here_ = false;  // no other thread computes
     std::thread thread_;
 };
 

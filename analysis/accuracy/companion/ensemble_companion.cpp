@@ -193,6 +193,7 @@ EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& traj
     Records kept = trajectory.kept;
     if (trajectory.stop >= 0) --kept.count;  // where it was stopped, between two steps
     companion.observe(kept);
+    companion.compute_here();
     TrajectoryResult result;
     result.steps_done = trajectory.steps_done;
     result.time = time_after(request_, trajectory.steps_done);

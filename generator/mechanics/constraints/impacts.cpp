@@ -41,8 +41,8 @@ void refuse_impacts(const Scene& scene, const std::string& what) {
     if (!scene.switches.empty() || !scene.tables.empty())
         scene.source.fail(scene.switches.empty() ? scene.tables.front().at : scene.switches.front().at,
                           what +
-                              " knows smooth formulas only; run, sweep, tune, tradeoff, emit, derive, check and verify "
-                              "know such as this");
+                              " takes smooth formulas only; run, sweep, tune, tradeoff, emit, derive, check and verify "
+                              "take this one, too");
 }
 
 void refuse_jumps(const Scene& scene, const std::string& what) {

@@ -61,9 +61,11 @@ std::vector<Dependence::Kind> Dependence::sampled(const std::vector<ex>& express
             examine(*formulas_, formulas_->convert(expressions), point, kinds);
         });
     } catch (const DomainError& error) {
-        refuse_lagrangian(scene_, fmt::format("has no finite real derivatives at or near the start: {}; start away "
+        const bool has_forces = std::any_of(scene_.coordinates.begin(), scene_.coordinates.end(),
+                                            [](const Coordinate& one) { return !one.force.is_zero(); });
+        refuse_lagrangian(scene_, fmt::format("{}has no finite real derivatives at or near the start: {}; start away "
                                               "from the singularity, or mend the formula",
-                                              error.what()));
+                                              has_forces ? "or a force beside it " : "", error.what()));
     }
     return kinds;
 }

@@ -190,7 +190,8 @@ private:
         shared_.steps_gone += (request_.steps - done) * side_by_side;
         for (std::size_t lane = 0; lane < ended.size(); ++lane) {
             if (reduces_[lane]) ended[lane].reduced = lanes_->reduced(lane);
-            ended[lane].has_near_cuts = lanes_->gap_of_cuts() < NearCuts::near * std::fabs(request_.step);
+            ended[lane].has_near_cuts =
+                lanes_->gap_of_cuts(time_after(request_, request_.steps)) < NearCuts::near * std::fabs(request_.step);
         }
         return !lanes_->is_cut_short();
     }

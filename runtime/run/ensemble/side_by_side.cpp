@@ -29,6 +29,7 @@ SingleTrajectory::SingleTrajectory(const Kernel& kernel, const EnsembleRequest& 
 
 void SingleTrajectory::prepare(const std::vector<double>& parameters, const std::vector<double>& step,
                                std::int32_t* status) {
+    cuts_.set_step(step[0]);
     *status = stepper_.prepare(parameters, step[0]);
 }
 
@@ -113,6 +114,7 @@ NumberTrajectory::NumberTrajectory(const Kernel& kernel, const EnsembleRequest& 
 
 void NumberTrajectory::prepare(const std::vector<double>& parameters, const std::vector<double>& step,
                                std::int32_t* status) {
+    cuts_.set_step(step[0]);
     *status = stepper_.prepare(parameters, step);
 }
 

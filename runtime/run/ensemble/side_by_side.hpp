@@ -33,8 +33,8 @@ public:
     // Of a trajectory that was stopped: by which event, and when.
     virtual int stop(std::size_t) const { return -1; }
     virtual double stop_time(std::size_t) const { return 0; }
-    // The shortest time between two cuts since the start (NearCuts).
-    virtual double gap_of_cuts() const { return std::numeric_limits<double>::infinity(); }
+    // The shortest time between two cuts from the start to this end (NearCuts).
+    virtual double gap_of_cuts(double) const { return std::numeric_limits<double>::infinity(); }
     // From the start on everything is handed to the reducer of a single trajectory; what it, or a device, made of it.
     virtual void reduce(const EnsembleStart&) {}
     virtual std::vector<double> reduced(std::size_t) const { return {}; }
@@ -56,7 +56,7 @@ public:
     void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
     int stop(std::size_t) const override { return stop_; }
     double stop_time(std::size_t) const override { return time_; }
-    double gap_of_cuts() const override { return cuts_.gap(); }
+    double gap_of_cuts(double end) const override { return cuts_.gap_until(end); }
     void reduce(const EnsembleStart& start) override;
     std::vector<double> reduced(std::size_t) const override { return reducer_->values(); }
 
@@ -85,7 +85,7 @@ public:
     void energy(const std::vector<double>& q, const std::vector<double>& p, std::vector<double>& energy) const override;
     int stop(std::size_t) const override { return stop_; }
     double stop_time(std::size_t) const override { return time_[0]; }
-    double gap_of_cuts() const override { return cuts_.gap(); }
+    double gap_of_cuts(double end) const override { return cuts_.gap_until(end); }
 
 private:
     NumberStepper stepper_;
