@@ -242,10 +242,11 @@ void Companion::take_one(Place& place, double from, const std::vector<double>& s
     place.advance(1, request_.tolerance);
     if (place.status != LOBATTO_OK) return;
     if (looks_at_usual_ && is_cut_ && std::isinf(place.cuts.last())) {
-        const std::vector<double> change = change_in_parts(place, step, 1, 2);
+        const std::vector<double> change = change_in_parts(place, step, 1, 2),
+                                  here = rounded(joined(place.q, place.p), parts_);
         usual_change_.resize(change.size());
         for (std::size_t i = 0; i < change.size(); ++i)
-            if (change[i] > usual_change_[i]) usual_change_[i] = change[i];
+            usual_change_[i] = std::fmax(usual_change_[i], std::fmax(change[i], kernel_->epsilon * std::fabs(here[i])));
         looks_at_usual_ = false;
     }
     const auto insert = [](std::vector<Pulse>& pulses, const Pulse& one) {
