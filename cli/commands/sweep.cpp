@@ -294,8 +294,9 @@ void add_sweep(CommandLine& program) {
     command.option("--threads", options->threads, "Threads that compute (default: as many as the machine runs)")
         .shown_as("N")
         .between(1, 1024);
-    command.flag("--unmeasured", options->unmeasured,
-                 "Do not measure errors by companions, which take 3/2 of the sweep's time");
+    command.flag(
+        "--unmeasured", options->unmeasured,
+        "Do not measure errors by companions, which take 3/2 of the sweep's time, more at short contacts and pulses");
     command.flag("--beyond-horizon", options->beyond_horizon,
                  "Trajectories of which nothing is left are no failures: for the statistics of chaos");
     command.flag("--quiet", options->quiet, "Print nothing but errors");

@@ -230,7 +230,8 @@ std::int64_t records_of_call(const Kernel& kernel, const TrajectoryRequest& requ
 class LastOfChain {
 public:
     LastOfChain(const Kernel& kernel, const TrajectoryRequest& request)
-        : request_(request), row_(kernel->clocked != 0 ? 1 + 2 * request.q.size() : 0) {}
+        : request_(request),
+          row_(kernel->clocked != 0 && kernel->real_kind == LOBATTO_DOUBLE ? 1 + 2 * request.q.size() : 0) {}
 
     void ask(lobatto_advance& call) { call.chain = row_.empty() ? nullptr : row_.data(); }
     void look(TrajectoryResult& result) {
@@ -260,7 +261,7 @@ private:
     }
 
     const TrajectoryRequest& request_;
-    std::vector<double> row_;  // t, q, p; clocks are of kernels in double
+    std::vector<double> row_;  // t, q, p, of kernels with a clock in double; else empty
     std::int64_t next_look_ = first_look;
     double time_looked_ = 0;
 };

@@ -88,8 +88,8 @@ TEST_CASE("two impacts within a step do not hide the error of the flight between
     REQUIRE(fine.run().exit_code == 0);
     const double error = std::fabs(coarse.end()[1] - fine.end()[1]), printed = absolute_error(finished.out);
     CAPTURE(error);
-    CHECK(printed > 0.5 * error);
-    CHECK(printed < 2 * error);
+    CHECK(printed > 0.8 * error);
+    CHECK(printed < 1.3 * error);
 }
 
 TEST_CASE("switches that change little do not make the printed error larger, over many of them") {
@@ -115,10 +115,10 @@ TEST_CASE("switches that change little do not make the printed error larger, ove
 TEST_CASE("where parts of steps cannot start on a wall, whole ones measure the motion") {
     const MeasuredScene box(
         "lagrangian = \"x'^2/2 + y'^2/2\"\n[coordinates]\nx = { position = 1, velocity = -1 }\n"
-        "y = { position = 1.01, velocity = -1 }\n[impacts]\n"
+        "y = { position = 1.000001, velocity = -1 }\n[impacts]\n"
         "a = { when = \"x = 0 falling\", restitution = 1 }\nb = { when = \"y = 0 falling\", restitution = 1 }\n"
         "c = { when = \"x = 2 rising\", restitution = 1 }\nd = { when = \"y = 2 rising\", restitution = 1 }\n"
-        "[method]\npoints = 3\n[run]\nstep = 0.07\nuntil = 400\n");
+        "[method]\npoints = 3\n[run]\nstep = 0.07\nuntil = 50\n");
     const test::Finished finished = box.run();
     CHECK_MESSAGE(finished.exit_code == 0, finished.err);
     CHECK(absolute_error(finished.out) < 1e-10);

@@ -37,7 +37,7 @@ std::vector<double> noise_levels(const std::vector<double>& sizes);
 // An amplitude below its noise level becomes 0 if the run and its companion do not agree on this number in most of the
 // first comparisons. `pair(j, i)`: number i at comparison j, of the run and of the companion. `start`: q, p.
 // A coordinate in a far larger unit is small, too, but it is left alone: it does not rest at 0 at the start, and the
-// product of its amplitude and that of its momentum is not small.
+// product of its amplitude and that of its momentum is not small, or it starts with much more than rounding.
 void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& start,
                      const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
 

@@ -8,7 +8,6 @@
 #include <numeric>
 #include <utility>
 
-#include "runtime/run/near_cuts.hpp"
 #include "runtime/run/parts.hpp"
 
 namespace lobatto {
@@ -20,11 +19,7 @@ constexpr std::int64_t most_comparisons = 256;
 constexpr std::int64_t amplitude_looks = 512;  // at the companion's way, for its amplitude, at least
 constexpr std::int64_t most_at_once = 65536;   // steps or arrivals, before it hears that nobody waits
 constexpr double short_run = 1;                // seconds: of these the companion always reaches the end
-constexpr double graded = 8;  // steps are at most this part of the distance to a pulse, or half of its width
-constexpr double graded_at_contacts = 2;  // likewise; more of other steps would change their energy
-constexpr double much = 64;               // times the usual
-constexpr double most_tried = 1000;
-constexpr double parted = 1.999;        // of a step: what is shorter is not in two parts yet
+constexpr double graded = 8;            // steps are at most this part of the distance to a pulse, or half of its width
 constexpr double finest = 0x1p-30;      // steps are never shorter than this part of those of the run
 constexpr double same_time = 0x1p-48;   // relative: times that differ by no more differ by rounding
 constexpr double same_as_rounded = 16;  // likewise, roundings of the kernel's numbers
@@ -33,23 +28,6 @@ constexpr std::int64_t most_looked = 4000000, looked_a_step = 8;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-std::vector<double> joined(std::vector<double> q, const std::vector<double>& p) {
-    q.insert(q.end(), p.begin(), p.end());
-    return q;
-}
-
-// Whether a step is to be divided at one of these, in the order of time.
-bool is_near(const std::vector<Pulse>& pulses, double grading, double from, double step) {
-    const double begin = std::fmin(from, from + step), end = std::fmax(from, from + step), size = end - begin;
-    const auto first = std::lower_bound(pulses.begin(), pulses.end(), begin - grading * size,
-                                        [](const Pulse& pulse, double time) { return pulse.time < time; });
-    for (auto pulse = first; pulse != pulses.end() && pulse->time < end + grading * size; ++pulse) {
-        const double distance = std::fmax(0.0, std::fmax(begin - pulse->time, pulse->time - end));
-        if (size > std::fmax(pulse->width / 2, distance / grading)) return true;
-    }
-    return false;
 }
 
 }  // namespace
@@ -67,7 +45,8 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
       is_finer_(kernel->epsilon < run_epsilon),
       groups_(amplitude_groups(outline.scene)),
       rows_a_step_(1 + request.dense),
-      narrow_(outline.system) {
+      narrow_(outline.system),
+      contacts_(outline.scene.is_cut(), request_) {
     narrow_.set_parameters(request.parameters);
     const auto all_of = [this](const std::vector<double>& whole, const std::vector<double>& doubles) {
         return whole.empty() ? as_parts(doubles, parts_) : whole;
@@ -93,7 +72,6 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
     const std::int64_t kept = (request_.steps + request_.every - 1) / request_.every;
     stride_ = request_.every * std::max<std::int64_t>(1, (kept + comparisons - 1) / comparisons);
     is_driven_ = !outline.system.autonomous;
-    is_cut_ = outline.scene.is_cut();
     if (is_driven_) stride_ *= (fewest_driven_steps + stride_ - 1) / stride_;
 }
 
@@ -152,53 +130,8 @@ void Companion::compute_here() {
     compute();
 }
 
-struct Companion::Place {
-    NumberStepper stepper;
-    std::vector<double> time, step;  // step: zero before the first
-    std::vector<double> q, p;
-    Arrivals arrivals;
-    lobatto_status status = LOBATTO_OK;
-    Range range = {};  // since the last comparison
-    NearCuts cuts = {};
-
-    struct State {
-        std::vector<double> time, step, q, p;
-        std::string memory;  // of the stepper: a start may be refused where the motion goes on, as on a wall
-    };
-    State before = {};  // the last step that was taken by itself
-    State state() const { return {time, step, q, p, stepper.memory()}; }
-    void go_back(const State& to) {
-        time = to.time;
-        step = to.step;
-        q = to.q;
-        p = to.p;
-        stepper.restore(to.memory);
-    }
-
-    // Steps of another size begin at this place.
-    void set_step(const std::vector<double>& size, const std::vector<double>& parameters) {
-        if (size == step || status != LOBATTO_OK) return;
-        status = stepper.prepare(parameters, size);
-        if (status == LOBATTO_OK) status = stepper.start(time, q, p);
-        step = size;
-    }
-    std::int64_t advance(std::int64_t steps, double tolerance) {
-        lobatto_advance call{};
-        call.steps = steps;
-        call.tolerance = tolerance;
-        call.interval = arrivals.interval;
-        call.end = arrivals.end;
-        cuts.ask(call);
-        std::vector<double> none, nothing;
-        if (status == LOBATTO_OK) status = stepper.advance(call, none, nothing);
-        cuts.observe(call);
-        stepper.state(time, q, p);
-        return call.steps_done;
-    }
-};
-
 bool Companion::is_near_pulse(double from, double step) const {
-    return is_near(pulses_, graded, from, step) || (divides_ && is_near(contacts_, graded_at_contacts, from, step));
+    return is_too_long(pulses_, graded, from, step) || contacts_.is_near(from, step);
 }
 
 // A knot that the step crosses, not one at which it begins or ends but for rounding.
@@ -216,7 +149,7 @@ bool Companion::can_halve(double from, double step) const {
 }
 
 // Steps shorter and shorter towards a pulse, each on one side of all knots.
-void Companion::take_finely(Place& place, double from, const std::vector<double>& step) {
+void Companion::take_finely(CompanionPlace& place, double from, const std::vector<double>& step) {
     if (place.status != LOBATTO_OK || cancelled_) return;
     const double size = step.front();
     if (const std::optional<double> knot = knot_within(from, size)) {
@@ -234,77 +167,27 @@ void Companion::take_finely(Place& place, double from, const std::vector<double>
 }
 
 // One step; shorter ones in its place, if the motion met something narrow in it.
-void Companion::take_one(Place& place, double from, const std::vector<double>& step) {
+void Companion::take_one(CompanionPlace& place, double from, const std::vector<double>& step) {
     place.before = place.state();
-    place.cuts.set_step(request_.step);
-    place.cuts.begin(from == request_.time ? from : std::numeric_limits<double>::infinity());
+    contacts_.begin(place, from);
     place.set_step(step, request_.whole_parameters);
     place.advance(1, request_.tolerance);
     if (place.status != LOBATTO_OK) return;
-    if (looks_at_usual_ && is_cut_ && std::isinf(place.cuts.last())) {
-        const std::vector<double> change = change_in_parts(place, step, 1, 2),
-                                  here = rounded(joined(place.q, place.p), parts_);
-        usual_change_.resize(change.size());
-        for (std::size_t i = 0; i < change.size(); ++i)
-            usual_change_[i] = std::fmax(usual_change_[i], std::fmax(change[i], kernel_->epsilon * std::fabs(here[i])));
-        looks_at_usual_ = false;
-    }
-    const auto insert = [](std::vector<Pulse>& pulses, const Pulse& one) {
-        pulses.insert(std::upper_bound(pulses.begin(), pulses.end(), one,
-                                       [](const Pulse& a, const Pulse& b) { return a.time < b.time; }),
-                      one);
-    };
-    const std::optional<Pulse> term = narrow_term(place, step),
-                               contact = term ? std::nullopt : short_contact(place, step);
+    const std::optional<Pulse> term = narrow_term(place, step);
     if (term)
-        insert(pulses_, *term);
-    else if (contact && matters(place, step, *contact))
-        insert(contacts_, *contact);
-    else
+        insert_in_order(pulses_, *term);
+    else if (!contacts_.is_met(place, step))
         return;
     if (!can_halve(from, step.front()) || !is_near_pulse(from, step.front())) return;
     place.go_back(place.before);
     take_finely(place, from, step);
 }
 
-// What it changes in q and p to take so many steps, the last one and those after it, each in so many parts.
-std::vector<double> Companion::change_in_parts(Place& place, const std::vector<double>& step, int steps, int parts) {
-    const Place::State after = place.state();
-    const auto lead_to = [&](int count, const std::vector<double>& size) {
-        place.go_back(place.before);
-        place.set_step(size, request_.whole_parameters);
-        place.advance(count, request_.tolerance);
-        return rounded(joined(place.q, place.p), parts_);
-    };
-    const std::vector<double> whole = lead_to(steps, step);
-    std::vector<double> change = lead_to(steps * parts, times_fraction(step, 1, parts));
-    for (std::size_t i = 0; i < change.size(); ++i) change[i] = std::fabs(change[i] - whole[i]);
-    if (place.status != LOBATTO_OK) change.assign(change.size(), std::numeric_limits<double>::infinity());
-    place.status = LOBATTO_OK;
-    place.go_back(after);
-    return change;
-}
-
-// Whether parts of a contact lead elsewhere by much more than halves of steps do that nothing cuts. Where they do not,
-// whole steps are better: parts would only change the energy.
-bool Companion::matters(Place& place, const std::vector<double>& step, const Pulse& contact) {
-    if (usual_change_.empty()) return true;
-    const double size = std::fabs(step.front()), parts = std::ceil(2 * size / contact.width),
-                 steps =
-                     1 + std::ceil((std::fabs(contact.time - place.before.time.front()) + contact.width / 2) / size);
-    if (!(parts <= most_tried)) return true;
-    const std::vector<double> change =
-        change_in_parts(place, step, static_cast<int>(steps), static_cast<int>(parts) + 1);
-    for (std::size_t i = 0; i < change.size(); ++i)
-        if (!(change[i] <= much * usual_change_[i])) return true;
-    return false;
-}
-
 // That the motion met in the last step.
-std::optional<Pulse> Companion::narrow_term(Place& place, const std::vector<double>& step) {
+std::optional<Pulse> Companion::narrow_term(CompanionPlace& place, const std::vector<double>& step) {
     if (narrow_.empty() || looked_ >= most_looked) return std::nullopt;
     looked_ += std::max(looked_a_step, static_cast<std::int64_t>(narrow_.count()));
-    const Place::State& before = place.before;
+    const CompanionPlace::State& before = place.before;
     const double from = before.time.front();
     NarrowTerms::State begin{from, rounded(before.q, parts_), {}},
         end{from + step.front(), rounded(place.q, parts_), {}};
@@ -316,44 +199,22 @@ std::optional<Pulse> Companion::narrow_term(Place& place, const std::vector<doub
     return narrow_.on_the_way(begin, end);
 }
 
-// Between two cuts that are nearer to one another than two steps of the run; the first of them is in the last step, or
-// the start of the run. The steps after it are taken on trial; the end of the run counts as a cut.
-std::optional<Pulse> Companion::short_contact(Place& place, const std::vector<double>& step) const {
-    const double first = place.cuts.last();
-    if (!is_cut_ || !divides_ || !std::isfinite(first)) return std::nullopt;
-    const double longest = NearCuts::near * std::fabs(request_.step), size = std::fabs(step.front()),
-                 end = time_after(request_, request_.steps);
-    const Place::State after = place.state();
-    while (place.cuts.last() == first && place.status == LOBATTO_OK &&
-           std::fabs(place.time.front() - first) <= longest) {
-        if (std::fabs(end - place.time.front()) < size / 2)
-            place.cuts.observe(end);
-        else
-            place.advance(1, request_.tolerance);
-    }
-    place.status = LOBATTO_OK;
-    place.go_back(after);
-    const double gap = place.cuts.gap();
-    if (!(gap < longest && gap < parted * size)) return std::nullopt;
-    return Pulse{place.cuts.middle(), gap};
-}
-
 std::vector<double> Companion::step_of(const Segment& part) const {
     return is_clocked() ? as_parts({request_.step / ratio_of(part)}, parts_)
                         : times_fraction(request_.whole_step, part.steps, part.taken);
 }
 
-void Companion::take(Place& place, const Segment& part) {
+void Companion::take(CompanionPlace& place, const Segment& part) {
     const double from = time_after(request_, part.begin), size = request_.step / ratio_of(part);
     const std::vector<double> whole_size = step_of(part);
     const std::int64_t piece = std::clamp<std::int64_t>(request_.steps / amplitude_looks, 1, most_at_once);
     std::int64_t done = 0;
     while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
         const double here = from + static_cast<double>(done) * size;
-        looks_at_usual_ = looks_at_usual_ || done == part.taken / 2;
-        const bool looks = !is_clocked() && ((is_cut_ && divides_) || (!narrow_.empty() && looked_ < most_looked));
+        if (done == part.taken / 2) contacts_.look_at_usual_change();
+        const bool looks = !is_clocked() && (contacts_.is_sought() || (!narrow_.empty() && looked_ < most_looked));
         std::int64_t count = 0;
-        const bool is_even = pulses_.empty() && knots_.empty() && (contacts_.empty() || !divides_);
+        const bool is_even = pulses_.empty() && knots_.empty() && !contacts_.is_any();
         while (!looks && count < std::min(piece, part.taken - done) &&
                (is_even || !needs_parts(here + static_cast<double>(count) * size, size)))
             count = is_even ? std::min(piece, part.taken - done) : count + 1;
@@ -366,15 +227,15 @@ void Companion::take(Place& place, const Segment& part) {
             place.set_step(whole_size, request_.whole_parameters);
             done += place.advance(count, request_.tolerance);
         }
-        const std::vector<double> row = rounded(joined(place.q, place.p), parts_);
-        widen_to(place.range.least, place.range.most, row.data(), row.size());
+        const std::vector<double> row = place.rounded_row();
+        widen_to(way_.least, way_.most, row.data(), row.size());
     }
 }
 
 void Companion::compute() {
-    Place place{NumberStepper(kernel_), as_parts({request_.time}, parts_),
-                as_parts({0}, parts_),  request_.whole_q,
-                request_.whole_p,       request_.arrivals};
+    CompanionPlace place{NumberStepper(kernel_), as_parts({request_.time}, parts_),
+                         as_parts({0}, parts_),  request_.whole_q,
+                         request_.whole_p,       request_.arrivals};
     std::size_t done = 0;
     {
         const std::lock_guard lock(mutex_);
@@ -404,32 +265,31 @@ void Companion::compute() {
     // A start is refused at some states on a wall that the motion passes. So where parts of steps fail, the way is
     // taken again in whole ones, from the last place where no new start is needed.
     std::size_t whole_until = 0, safe = done;
-    Place::State safe_state = place.state();
+    CompanionPlace::State safe_state = place.state();
     for (Segment part = segment(done); part.steps > 0 && !(is_here_ && has_caught_up()); part = segment(++done)) {
-        if (is_cut_ && place.step == step_of(part)) {
+        contacts_.set_divided(done >= whole_until);
+        if (contacts_.is_sought() && place.step == step_of(part)) {
             safe = done;
             safe_state = place.state();
         }
-        divides_ = done >= whole_until;
         take(place, part);
         if (cancelled_) return;
         const std::lock_guard lock(mutex_);
-        if (place.status != LOBATTO_OK && is_cut_ && divides_) {
+        if (place.status != LOBATTO_OK && contacts_.is_sought()) {
             whole_until = done + 1;
             companion_.resize(companion_.size() - (done - safe));
             companion_ranges_.resize(companion_.size());
             done = safe - 1;  // and on with the next one
-            place.status = LOBATTO_OK;
             place.go_back(safe_state);
-            place.range = {};
+            way_ = {};
             continue;
         }
         if (place.status != LOBATTO_OK) {
             stopped_ = place.time[0];
             break;
         }
-        companion_.push_back({part.begin + part.steps, joined(place.q, place.p)});
-        companion_ranges_.push_back(std::exchange(place.range, {}));
+        companion_.push_back({part.begin + part.steps, place.row()});
+        companion_ranges_.push_back(std::exchange(way_, {}));
     }
     finished_ = true;
 }

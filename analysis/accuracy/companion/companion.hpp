@@ -28,6 +28,8 @@
 
 #include "analysis/accuracy/companion/amplitude.hpp"
 #include "analysis/accuracy/companion/measured_error.hpp"
+#include "analysis/accuracy/companion/place.hpp"
+#include "analysis/accuracy/companion/short_contacts.hpp"
 #include "analysis/accuracy/formulas/narrow_terms.hpp"
 #include "analysis/accuracy/formulas/pulses.hpp"
 #include "generator/mechanics/outline.hpp"
@@ -83,21 +85,16 @@ private:
         std::int64_t taken = 0;             // of the companion
     };
 
-    struct Place;  // where the companion is, and its stepper
-
     Segment segment(std::size_t number) const;
     bool is_clocked() const { return request_.arrivals.interval != 0; }
     double ratio_of(const Segment& part) const;
     void compute();
     std::vector<double> step_of(const Segment& part) const;
-    void take(Place& place, const Segment& part);
+    void take(CompanionPlace& place, const Segment& part);
     // `step` has all digits: steps and the parts of them end at the times of the run.
-    void take_finely(Place& place, double from, const std::vector<double>& step);
-    void take_one(Place& place, double from, const std::vector<double>& step);
-    std::optional<Pulse> narrow_term(Place& place, const std::vector<double>& step);
-    std::vector<double> change_in_parts(Place& place, const std::vector<double>& step, int steps, int parts);
-    bool matters(Place& place, const std::vector<double>& step, const Pulse& contact);
-    std::optional<Pulse> short_contact(Place& place, const std::vector<double>& step) const;
+    void take_finely(CompanionPlace& place, double from, const std::vector<double>& step);
+    void take_one(CompanionPlace& place, double from, const std::vector<double>& step);
+    std::optional<Pulse> narrow_term(CompanionPlace& place, const std::vector<double>& step);
     bool has_caught_up() const;
     bool has_compared() const;
     bool can_halve(double from, double step) const;
@@ -115,17 +112,14 @@ private:
     TrajectoryRequest request_;
     std::vector<int> groups_;
     int rows_a_step_;
-    std::vector<Pulse> pulses_;         // which the steps of the run may miss: the companion's are fine there
-    NarrowTerms narrow_;                // likewise, where the motion meets them
-    std::vector<double> knots_;         // of measured values in time, at which its steps end
-    std::int64_t looked_ = 0;           // at terms, along steps of the companion
-    bool is_driven_ = false;            // explicit time
-    bool is_cut_ = false;               // at walls and switches
-    std::vector<Pulse> contacts_;       // between cuts that are near to one another
-    std::vector<double> usual_change_;  // of q and p, where a step that nothing cuts is halved
-    bool looks_at_usual_ = true;
-    bool divides_ = true;  // these into parts
-    std::int64_t stride_;  // steps of the run between comparisons
+    std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
+    NarrowTerms narrow_;         // likewise, where the motion meets them
+    std::vector<double> knots_;  // of measured values in time, at which its steps end
+    std::int64_t looked_ = 0;    // at terms, along steps of the companion
+    bool is_driven_ = false;     // explicit time
+    ShortContacts contacts_;     // likewise
+    Range way_;                  // since the last comparison
+    std::int64_t stride_;        // steps of the run between comparisons
     std::int64_t seen_ = 0;
     std::vector<Point> run_;               // of the run, at comparisons
     Range range_;                          // of the run's kept states

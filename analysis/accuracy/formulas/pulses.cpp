@@ -261,4 +261,21 @@ std::vector<double> find_knots(const Outline& outline, const std::vector<double>
     return finder.knots();
 }
 
+void insert_in_order(std::vector<Pulse>& pulses, const Pulse& one) {
+    pulses.insert(std::upper_bound(pulses.begin(), pulses.end(), one,
+                                   [](const Pulse& a, const Pulse& b) { return a.time < b.time; }),
+                  one);
+}
+
+bool is_too_long(const std::vector<Pulse>& pulses, double grading, double from, double step) {
+    const double begin = std::fmin(from, from + step), end = std::fmax(from, from + step), size = end - begin;
+    const auto first = std::lower_bound(pulses.begin(), pulses.end(), begin - grading * size,
+                                        [](const Pulse& pulse, double time) { return pulse.time < time; });
+    for (auto pulse = first; pulse != pulses.end() && pulse->time < end + grading * size; ++pulse) {
+        const double distance = std::fmax(0.0, std::fmax(begin - pulse->time, pulse->time - end));
+        if (size > std::fmax(pulse->width / 2, distance / grading)) return true;
+    }
+    return false;
+}
+
 }  // namespace lobatto

@@ -15,6 +15,11 @@ struct Pulse {
     double width;  // on this scale the formula changes there
 };
 
+// In the order of time: one more among them; whether a step is longer than half of the width of one of them, or than
+// the distance to it over `grading`.
+void insert_in_order(std::vector<Pulse>& pulses, const Pulse& one);
+bool is_too_long(const std::vector<Pulse>& pulses, double grading, double from, double step);
+
 // Those between two times that are narrower than `widest`, with the parameters at these values (scene order): of
 // exp(u) where u(t) is largest, of u^-k near complex roots of u, of tanh, atan, sinh, cosh and exp of a linear u where
 // u passes zero, of a table of a linear u where it bends most, of if and its kin where u passes zero twice; u holds the

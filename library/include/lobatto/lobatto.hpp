@@ -309,7 +309,7 @@ struct SweepOptions : Settings {
     std::optional<std::int64_t> steps;  ///< instead of an end time
     Device device = Device::processor;
     int threads = 0;              ///< 0: as many as the machine runs
-    bool measure = true;          ///< errors by companions, which take 3/2 of the sweep's time
+    bool measure = true;          ///< errors by companions: 3/2 of the sweep's time, more at contacts and pulses
     bool beyond_horizon = false;  ///< trajectories of which nothing is left are no failures
     std::function<bool(double)> progress;
 };
