@@ -78,7 +78,7 @@ Experiment::Experiment(const Scene& written, const Scene& scene, ExperimentReque
       scene_(scene),
       request_(std::move(request)),
       start_(scene),
-      kernels_(written, request_.tries_clocks),
+      kernels_(written, scene, request_.tries_clocks),
       conserves_(kernels_.derivation().conserves_energy()) {
     Member reference = reference_member(scene, request_.wanted);
     const double until = end_of(scene);

@@ -13,11 +13,20 @@ namespace lobatto {
 
 namespace {
 
-// Nothing where there is none, or it is not positive at the start.
-std::optional<Derivation> derive_with_automatic_clock(const Scene& scene) {
-    if (!has_automatic_clock(scene)) return std::nullopt;
+// With other values of the parameters where the scene allows no start with its own (derived_kernel.hpp).
+Derivation derive_for(const Scene& written, const Scene& with_values) {
     try {
-        return derive(with_automatic_clock(scene));
+        return derive(written);
+    } catch (const InputError&) {
+        return derive(with_values);
+    }
+}
+
+// Nothing where there is none, or it is not positive at the start.
+std::optional<Derivation> derive_with_automatic_clock(const Scene& written, const Scene& with_values) {
+    if (!has_automatic_clock(written)) return std::nullopt;
+    try {
+        return derive_for(with_automatic_clock(written), with_automatic_clock(with_values));
     } catch (const InputError&) {
         return std::nullopt;
     }
@@ -25,18 +34,18 @@ std::optional<Derivation> derive_with_automatic_clock(const Scene& scene) {
 
 }  // namespace
 
-KernelBuilder::KernelBuilder(const Scene& scene, bool tries_clocks) {
-    const StepClock own = !scene.clock                ? StepClock::none
-                          : scene.clock->is_automatic ? StepClock::automatic
-                                                      : StepClock::of_scene;
-    if (own != StepClock::none) derivations_.emplace(own, derive(scene));
-    const Scene equal = with_equal_steps(scene);
-    derivations_.emplace(StepClock::none, derive(equal));
+KernelBuilder::KernelBuilder(const Scene& written, const Scene& with_values, bool tries_clocks) {
+    const StepClock own = !written.clock                ? StepClock::none
+                          : written.clock->is_automatic ? StepClock::automatic
+                                                        : StepClock::of_scene;
+    if (own != StepClock::none) derivations_.emplace(own, derive_for(written, with_values));
+    const Scene equal = with_equal_steps(written), equal_with_values = with_equal_steps(with_values);
+    derivations_.emplace(StepClock::none, derive_for(equal, equal_with_values));
     allowed_ = {own};
     if (tries_clocks) {
         allowed_.insert(StepClock::none);
         if (std::optional<Derivation> automatic;
-            own != StepClock::automatic && (automatic = derive_with_automatic_clock(equal)))
+            own != StepClock::automatic && (automatic = derive_with_automatic_clock(equal, equal_with_values)))
             allowed_.insert(derivations_.emplace(StepClock::automatic, std::move(*automatic)).first->first);
     }
     try {

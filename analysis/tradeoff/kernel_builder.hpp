@@ -23,8 +23,9 @@ namespace lobatto {
 // For one thread; the compilers have their own.
 class KernelBuilder {
 public:
-    // The kernels that serve a scene; `tries_clocks`: with clocks that it does not have, and without the one it has.
-    KernelBuilder(const Scene& scene, bool tries_clocks);
+    // The kernels that serve a scene, and the same scene with other values of parameters. `tries_clocks`: with clocks
+    // that it does not have, and without the one it has.
+    KernelBuilder(const Scene& written, const Scene& with_values, bool tries_clocks);
     ~KernelBuilder();  // ends the compilers at work
     KernelBuilder(const KernelBuilder&) = delete;
     KernelBuilder& operator=(const KernelBuilder&) = delete;

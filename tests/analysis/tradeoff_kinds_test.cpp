@@ -77,27 +77,37 @@ TEST_CASE("a kernel builder allows what the scene and lobatto run do") {
     const auto member = [](Family family, int points, StepClock clock) {
         return Member{family, points, Precision::double_, StepArithmetic::plain, clock};
     };
-    const KernelBuilder orbit(scene_of(kepler_text(0.5, "points = 5", 1)), true);
+    const Scene orbiting = scene_of(kepler_text(0.5, "points = 5", 1));
+    const KernelBuilder orbit(orbiting, orbiting, true);
     CHECK(orbit.allows(member(Family::gauss, 4, StepClock::automatic)));
     CHECK(orbit.allows(member(Family::splitting, 11, StepClock::none)));
     CHECK_FALSE(orbit.allows(member(Family::splitting, 11, StepClock::automatic)));
     CHECK_FALSE(orbit.allows(member(Family::gauss, 4, StepClock::of_scene)));
     CHECK_FALSE(
         orbit.allows({Family::lobatto, 8, Precision::double_double, StepArithmetic::plain, StepClock::automatic}));
-    CHECK_FALSE(KernelBuilder(scene_of(kepler_text(0.5, "points = 5", 1)), false)
-                    .allows(member(Family::gauss, 4, StepClock::automatic)));
+    CHECK_FALSE(KernelBuilder(orbiting, orbiting, false).allows(member(Family::gauss, 4, StepClock::automatic)));
 
     const Scene clocked = scene_of(kepler_text(0.5, "points = 5\nclock = \"sqrt(x^2 + y^2)\"", 1));
-    const KernelBuilder all(clocked, true), own(clocked, false);
+    const KernelBuilder all(clocked, clocked, true), own(clocked, clocked, false);
     for (const StepClock clock : {StepClock::none, StepClock::automatic, StepClock::of_scene}) {
         CHECK(all.allows(member(Family::lobatto, 8, clock)));
         CHECK(own.allows(member(Family::lobatto, 8, clock)) == (clock == StepClock::of_scene));
     }
 
-    const KernelBuilder constrained(scene_of(rod), true);
+    const Scene tied = scene_of(rod);
+    const KernelBuilder constrained(tied, tied, true);
     CHECK(constrained.allows(member(Family::lobatto, 8, StepClock::none)));
     CHECK_FALSE(constrained.allows(member(Family::gauss, 8, StepClock::none)));
     CHECK(constrained.clocks().empty());
+}
+
+TEST_CASE("other values of the parameters decide where those of the scene allow no start") {
+    std::string text = rod;
+    text.replace(text.find("= 1\"\n"), 4, "= l^2\"");
+    const auto of_length = [&](const char* l) { return scene_of(text + "[parameters]\nl = " + l + "\n"); };
+    const KernelBuilder kernels(of_length("2"), of_length("1"), true);
+    CHECK(kernels.allows({Family::lobatto, 8, Precision::double_, StepArithmetic::plain, StepClock::none}));
+    CHECK_THROWS_AS(KernelBuilder(of_length("2"), of_length("1.5"), true), InputError);
 }
 
 TEST_CASE("errors with a clock are those at given times, and at the steps themselves, against Kepler's solution" *
