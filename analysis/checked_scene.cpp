@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "generator/describe/explain.hpp"
+#include "generator/emit/tables.hpp"
 #include "generator/pipeline.hpp"
 
 namespace lobatto {
@@ -30,14 +31,17 @@ std::vector<CheckedOutput> outputs_of(const Derivation& derivation, long operati
     for (const Event& stop : derivation.scene.run.stops) stops += (stops.empty() ? "" : ", ") + stop.text;
     for (const Impact& impact : derivation.scene.impacts) impacts += (impacts.empty() ? "" : ", ") + impact.when.text;
     for (const Event& event : asked.events) events += (events.empty() ? "" : ", ") + event.text;
+    const std::string tangent =
+        !derivation.system.constraints.empty() ? "not computed with constraints"
+        : !has_tangent(derivation)             ? fmt::format("not computed beyond {} coordinates", tangent_limit)
+        : derivation.structure.is_explicit()   ? "the derivative of a step, one kick and drift after another"
+                                               : "the derivative of a step, from the matrix of its equations";
     std::vector<CheckedOutput> all{
         {"energy", asked.energy, "H at every kept state",
          cost(asked.energy, [](Outputs& outputs) { outputs.energy = false; })},
         {"momenta", asked.momenta, "columns p_... of the trajectory", 0},
-        {"tangent", asked.tangent,
-         derivation.structure.is_explicit() ? "the derivative of a step, one kick and drift after another"
-                                            : "the derivative of a step, from the matrix of its equations",
-         cost(asked.tangent, [](Outputs& outputs) { outputs.tangent = false; })},
+        {"tangent", asked.tangent, tangent,
+         cost(has_tangent(derivation), [](Outputs& outputs) { outputs.tangent = false; })},
         {"dense", asked.dense > 0, fmt::format("{} states inside each step, from the step's polynomial", asked.dense),
          0},
         {"events", !asked.events.empty(), events,

@@ -73,6 +73,7 @@ private:
 // have the flags of users. A compiler that $CXX names stays as it is.
 constexpr const char* compiled_quickly[] = {
     "/analysis/amplitude_test.cpp",
+    "/analysis/at_rest_test.cpp",
     "/analysis/bodies_test.cpp",
     "/analysis/clock_test.cpp",
     "/analysis/companion_test.cpp",

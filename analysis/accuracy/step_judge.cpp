@@ -10,6 +10,7 @@
 
 #include "analysis/accuracy/companion/companion.hpp"
 #include "analysis/accuracy/force_rounding.hpp"
+#include "analysis/accuracy/formulas/constraint_sizes.hpp"
 #include "analysis/stability/limit.hpp"
 #include "runtime/measure/frequency.hpp"
 
@@ -134,14 +135,22 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
     judgement.limit = stability_limit(outline.quadrature, judgement.radians);
 
     // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
-    const std::vector<bool> moves = moving(least_, most_);
+    std::vector<double> by_constraints;
+    const ConstraintSizes constraints(outline.system);
+    for (const auto& [place, state] : some_)
+        constraints.widen(by_constraints, state.row[0], state.row.data() + 1, request.parameters);
+    const std::vector<bool> moves = moving(least_, most_, places_of(least_, most_, by_constraints));
     std::vector<double> measure = scale, sizes(2 * n, 0.0);
     for (std::size_t i = 0; i < 2 * n; ++i)
         if (moves[i]) sizes[i] = scale[i];
     const std::vector<double> levels = noise_levels(sizes);
-    for (std::size_t i = 0; i < 2 * n; ++i) measure[i] = std::fmax(measure[i], levels[i]);
+    // On the straight way between two states, off the constraints, what they hold is fast.
+    const double least = outline.scene.constraints.empty() ? 1 : std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < 2 * n; ++i)
+        if (measure[i] < levels[i]) measure[i] = least * levels[i];
     for (std::size_t k = 0; k < n; ++k)
-        if (!moves[k]) measure[k] = measure[n + k] = std::numeric_limits<double>::infinity();
+        for (const std::size_t i : {k, n + k})
+            if (!moves[k] || !moves[i]) measure[i] = std::numeric_limits<double>::infinity();
     const std::optional<double> unresolved = first_unresolved(stepper, hardest_.states(), request.every, result.time,
                                                               request.parameters, request.step, measure);
     if (unresolved) judgement.unresolved = {1 + std::llround((*unresolved - request.time) / request.step), *unresolved};

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/accuracy/formulas/constraint_sizes.hpp"
 #include "analysis/stability/limit.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/build/sha256.hpp"
@@ -91,6 +92,15 @@ Experiment::Experiment(const Scene& written, const Scene& scene, ExperimentReque
     wish.until = until;
     wish.wanted = request_.wanted;
     wish.groups = amplitude_groups(scene_);
+    if (!scene_.constraints.empty()) {
+        const auto doubles = [](const std::vector<GiNaC::numeric>& values) {
+            std::vector<double> rounded;
+            for (const GiNaC::numeric& value : values) rounded.push_back(value.to_double());
+            return rounded;
+        };
+        ConstraintSizes(kernels_.derivation().system)
+            .widen(wish.places, 0, doubles(start_.q).data(), doubles(start_.parameters));
+    }
     wish.is_cut = scene_.is_cut();
     wish.has_walls = !scene_.impacts.empty();
     wish.interrupted = request_.interrupted;

@@ -25,6 +25,8 @@ double seconds_since(Clock::time_point start) {
 // Numbers with many divisors, so that many numbers of steps meet many of the samples.
 constexpr int sample_counts[] = {2520, 840, 360, 120, 60};
 constexpr double rough = 1e-6;            // tolerance of the first look
+constexpr double fine = 1e-15;            // likewise, where constraints hold what hardly moves
+constexpr double held = 1000;             // tolerances: constraints leave as much to what rests
 constexpr double precise_factor = 6;      // what the precise way takes longer, at most, about
 constexpr double half = 0.5;              // of the seconds, for a first way; the rest is for finer steps
 constexpr double overtime = 1.25;         // of the seconds: then it is given up
@@ -119,6 +121,7 @@ private:
         const int samples = sample_counts[std::size(sample_counts) - 2];
         const auto began = Clock::now();
         auto states = extrapolate(samples, static_cast<real>(rough), true);
+        if (states && hardly_moves_) states = extrapolate(samples, static_cast<real>(fine), true);
         if (!states)
             throw ComputationError(
                 "the motion cannot be followed to the end: it runs into a singularity, or away to infinity");
@@ -177,13 +180,25 @@ private:
                 fail_slow(static_cast<double>(way.time()) / (quick ? precise_factor : 1));
         }
         evaluations_ = way.evaluations();
-        if (quick) set_scale(way.least(), way.most());
+        if (quick) set_scale(way.least(), way.most(), tolerance);
         return states;
     }
 
-    // On all of the way: samples may miss a close encounter.
-    void set_scale(const std::vector<real>& least, const std::vector<real>& most) {
+    // On all of the way: samples may miss a close encounter. What moves by no more than the tolerance leaves to what
+    // constraints hold may rest: a finer look tells.
+    void set_scale(const std::vector<real>& least, const std::vector<real>& most, real tolerance) {
         spread([&](std::size_t i) { return (most[i] - least[i]) / 2; }, scale_);
+        hardly_moves_ = false;
+        std::vector<real> places(2 * n_, real(0));
+        if (!request_.places.empty())
+            spread([&](std::size_t i) { return static_cast<real>(request_.places[i]); }, places);
+        for (std::size_t i = 0; i < n_; ++i) {
+            if (places[i] > 0 && scale_[i] <= static_cast<real>(held) * tolerance * places[i]) {
+                hardly_moves_ = true;
+                scale_[i] = places[i];
+                scale_[n_ + i] = 1;
+            }
+        }
         for (real& value : scale_)
             if (!(value > 0)) value = 1;
     }
@@ -326,6 +341,7 @@ private:
     std::size_t n_ = 0;
     StartIn<real> start_;
     std::vector<real> scale_;
+    bool hardly_moves_ = false;
     std::int64_t evaluations_ = 0;
     double covered_ = 0;  // the time that the family's last way came to
     Reference reference_;

@@ -25,7 +25,8 @@ struct Reference {
     std::int64_t steps = 0;    // of the family, where steps are cut; else 0
     std::vector<double> high, low;     // (samples + 1) x 2n, q then p: the state is the sum of both
     std::vector<double> scale;         // 2n: half the way between smallest and largest value, the largest among the
-                                       // coordinates of the same unit, momenta likewise; 1 where nothing moves
+                                       // coordinates of the same unit, momenta likewise; where nothing moves, the
+                                       // place that constraints measure it by, or 1
     std::vector<double> disagreement;  // samples + 1: of the two ways up to there, relative to `scale`
     double tolerance = 0;              // of a macro step of the extrapolation
     double energy_scale = 0;           // the largest |p v|/2
@@ -42,11 +43,12 @@ struct Reference {
 
 struct ReferenceRequest {
     double until = 0;
-    double wanted = 1e-20;      // the disagreement that is good enough
-    double seconds_limit = 10;  // of wall time, beyond which it stays as good as it is
-    std::vector<int> groups;    // n: coordinates of the same unit have the same number
-    bool is_cut = false;        // steps are, at walls, or where formulas are not smooth
-    bool has_walls = false;     // at which momenta jump
+    double wanted = 1e-20;       // the disagreement that is good enough
+    double seconds_limit = 10;   // of wall time, beyond which it stays as good as it is
+    std::vector<int> groups;     // n: coordinates of the same unit have the same number
+    std::vector<double> places;  // 2n: what constraints measure the rounding of positions by; empty: there are none
+    bool is_cut = false;         // steps are, at walls, or where formulas are not smooth
+    bool has_walls = false;      // at which momenta jump
     const volatile int* interrupted = nullptr;
 };
 

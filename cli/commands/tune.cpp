@@ -40,8 +40,9 @@ void print(const Choice& choice, const Scene& scene, double error) {
     const Measurement& m = choice.measurement;
     fmt::print("{}: error at most {:.2g} to t = {:.6g}, relative to the amplitude of the motion\n\n{}\n", scene.path,
                error, choice.until, method_text(choice));
-    print_row("predicted error", fmt::format("{:.2g}: measured against {}, which is known to {:.1g}", m.error,
-                                             choice.reference, choice.uncertainty));
+    print_row("predicted error",
+              fmt::format("{:.2g}: measured against {}, which is known to {}", m.error, choice.reference,
+                          choice.uncertainty > 0 ? fmt::format("{:.1g}", choice.uncertainty) : "all its digits"));
     print_row("cost", fmt::format("{} to the end, {:.3g} ns and {:.3g} gradients per unit of time", duration(m.seconds),
                                   m.seconds / choice.until * 1e9, m.gradients / choice.until));
     print_row("stability", stability_text(choice));

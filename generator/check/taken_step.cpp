@@ -38,6 +38,7 @@ public:
         if (!system_.constraints.empty()) {
             add_sizes_of_others(size, size0, size1);
             add_sizes_of_constraints(size);
+            add_sizes_of_impulses(size0, size1);
         }
         Noise noise(12);
         const auto rounded = [&](const cln::cl_R& value, const cln::cl_R& of) {
@@ -107,6 +108,14 @@ private:
             for (Numbers* const momentum : {&momentum0, &momentum1})
                 (*momentum)[k] = cln::max(cln::abs((*momentum)[k]), cln::sqrt(pushed * mass[k]));
         }
+    }
+
+    // Momenta are sums of impulses, which constraints may take all away.
+    void add_sizes_of_impulses(Numbers& momentum0, Numbers& momentum1) {
+        const Numbers in_forces = rounding_in_forces();
+        for (Numbers* const momentum : {&momentum0, &momentum1})
+            for (std::size_t k = 0; k < n_; ++k)
+                (*momentum)[k] = cln::max((*momentum)[k], in_forces[k] / step_.epsilon);
     }
 
     // Positions are no better than the constraints that they are solved for: the terms of phi round, and what that

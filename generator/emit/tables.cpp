@@ -104,7 +104,14 @@ std::string general_shapes(const Derivation& d) {
     line(text, fmt::format("int constraints = {}", d.system.constraints.size()), "phi(q, t) = 0");
     line(text, fmt::format("int constraint_entries = {}", slopes.size()),
          "of G = dphi/dq that are not identically zero");
-    return text + places("constraint", slopes);
+    text += places("constraint", slopes);
+    if (d.system.constraints.empty()) return text;
+    std::vector<int> rows;
+    int row = 0;
+    for (const std::vector<GiNaC::ex>& of_one : d.system.constraint_summands())
+        rows.insert(rows.end(), of_one.size(), row++);
+    line(text, fmt::format("int summand_count = {}", rows.size()), "by which the rounding of phi is measured");
+    return text + integer_table("summand_row", rows);
 }
 
 // Where the unknowns of each coordinate stand, and the groups that are solved by themselves.

@@ -176,6 +176,17 @@ private:
         for (const auto& [place, slope] : d_.system.constraint_q.entries())
             program.outputs.push_back({at("G", e++), convert(slope)});
         p_.programs.push_back(std::move(program));
+        Program summands{"summands", {}};
+        e = 0;
+        for (const std::vector<ex>& of_one : d_.system.constraint_summands()) {
+            Ids ids;
+            for (const ex& summand : of_one) ids.push_back(convert(summand));
+            for (Id& id : ids)
+                if (g().is_negative(id)) id = g().negate(id);
+            std::sort(ids.begin(), ids.end(), [this](Id a, Id b) { return g().compare(a, b) < 0; });
+            for (const Id id : ids) summands.outputs.push_back({at("T", e++), id});
+        }
+        p_.programs.push_back(std::move(summands));
         multiplier_terms();
     }
 

@@ -152,7 +152,7 @@ void SystemReader::read_constraint(const Entry& entry) {
         solve_constraint(constraint, sides, scope, indices);
         scene_.constraints.push_back(constraint);
     }
-    require_freedom(entry.at);
+    require_freedom(entry.at, ", or they depend on one another: leave out one that follows from the others");
 }
 
 void SystemReader::require_freedom(Position at, const std::string& or_else) const {

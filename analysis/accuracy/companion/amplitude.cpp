@@ -43,15 +43,16 @@ void widen_to(std::vector<double>& least, std::vector<double>& most, const doubl
     }
 }
 
-std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most, double rounding) {
+std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most,
+                         const std::vector<double>& places, double rounding) {
     const std::size_t n = least.size() / 2;
-    const auto place = [&](std::size_t i) { return std::fmax(std::fabs(least[i]), std::fabs(most[i])); };
     double farthest[2] = {0, 0};  // of positions, of momenta
-    for (std::size_t i = 0; i < 2 * n; ++i) farthest[i / n] = std::fmax(farthest[i / n], place(i));
+    for (std::size_t i = 0; i < 2 * n; ++i)
+        farthest[i / n] = std::fmax(farthest[i / n], std::fmax(std::fabs(least[i]), std::fabs(most[i])));
     std::vector<bool> moves(2 * n);
     for (std::size_t i = 0; i < 2 * n; ++i) {
         const double half = (most[i] - least[i]) / 2;
-        moves[i] = half > rounding * place(i) && half > held_at_zero * farthest[i / n];
+        moves[i] = half > rounding * places[i] && half > held_at_zero * farthest[i / n];
     }
     return moves;
 }
@@ -74,10 +75,12 @@ void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons, c
     const auto is_displaced = [&](std::size_t i) {
         return start[i] != 0 && std::fabs(start[i]) >= displaced * amplitudes[i];
     };
-    const auto is_above_rounding = [&](std::size_t i) { return amplitudes[i] > many_roundings / noise * levels[i]; };
+    const auto is_small_but_meant = [&](std::size_t i) {
+        return amplitudes[i] < levels[i] && amplitudes[i] > many_roundings / noise * levels[i];
+    };
     const auto is_of_another_unit = [&](std::size_t k) {
-        return (is_displaced(k) && (products[k] > smallest || is_above_rounding(k))) ||
-               (is_displaced(n + k) && (products[k] > smallest || is_above_rounding(n + k)));
+        return (is_displaced(k) && (products[k] > smallest || is_small_but_meant(k))) ||
+               (is_displaced(n + k) && (products[k] > smallest || is_small_but_meant(n + k)));
     };
     for (std::size_t i = 0; i < amplitudes.size(); ++i) {
         if (!(amplitudes[i] > 0 && amplitudes[i] < levels[i] && !is_of_another_unit(i % n))) continue;
@@ -91,13 +94,13 @@ void leave_out_noise(std::vector<double>& amplitudes, std::size_t comparisons, c
     }
 }
 
-void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& place,
+void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& places,
                         double steps, double epsilon, const FirstMoves& first,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
     const std::size_t n = amplitudes.size() / 2;
     for (std::size_t i = 0; i < 2 * n; ++i) {
-        if (!(amplitudes[i] > 0 && amplitudes[i] < epsilon * steps * place[i])) continue;
-        if (first.amplitudes[i] > epsilon * (first.steps + few_roundings) * place[i]) continue;
+        if (!(amplitudes[i] > 0 && amplitudes[i] < epsilon * steps * places[i])) continue;
+        if (first.amplitudes[i] > epsilon * (first.steps + few_roundings) * places[i]) continue;
         for (std::size_t j = 0; j < comparisons && amplitudes[i] > 0; ++j) {
             const auto [run, companion] = pair(j, i);
             if (std::fabs(run - companion) > out_of_step * amplitudes[i]) amplitudes[i] = 0;
@@ -106,10 +109,13 @@ void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons
     }
 }
 
-std::vector<double> sizes_of(const std::vector<double>& least, const std::vector<double>& most) {
-    std::vector<double> sizes;
-    for (std::size_t i = 0; i < least.size(); ++i) sizes.push_back(std::fmax(std::fabs(least[i]), std::fabs(most[i])));
-    return sizes;
+std::vector<double> places_of(const std::vector<double>& least, const std::vector<double>& most,
+                              const std::vector<double>& by_constraints) {
+    std::vector<double> places = by_constraints;
+    places.resize(least.size(), 0.0);
+    for (std::size_t i = 0; i < least.size(); ++i)
+        places[i] = std::fmax(places[i], std::fmax(std::fabs(least[i]), std::fabs(most[i])));
+    return places;
 }
 
 std::vector<double> half_of(const std::vector<double>& least, const std::vector<double>& most) {
@@ -119,10 +125,10 @@ std::vector<double> half_of(const std::vector<double>& least, const std::vector<
 }
 
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,
-                                  const std::vector<int>& groups, double epsilon) {
+                                  const std::vector<double>& places, const std::vector<int>& groups, double epsilon) {
     const std::size_t n = groups.size();
     std::vector<double> own(2 * n), shared(2 * n, 0.0);
-    const std::vector<bool> moves = moving(least, most, few_roundings * epsilon);
+    const std::vector<bool> moves = moving(least, most, places, few_roundings * epsilon);
     const std::vector<double> half = half_of(least, most);
     for (std::size_t i = 0; i < 2 * n; ++i) own[i] = moves[i] ? half[i] : 0;
     for (std::size_t k = 0; k < n; ++k)

@@ -27,8 +27,10 @@ std::vector<int> amplitude_groups(const Scene& scene);
 // Takes a row of `count` numbers into a range.
 void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count);
 
-// Of q then p: which move by more than rounding does, which is this part of their place.
-std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most, double rounding = 0x1p-40);
+// Of q then p: which move by more than rounding does, which is this part of their place. `places`: of each number
+// (places_of).
+std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most,
+                         const std::vector<double>& places, double rounding = 0x1p-40);
 
 // For each number `noise` times the largest size of its kind, positions or momenta. A number that moves by less may be
 // moved by rounding alone: forces may cancel, and constraints may hold a momentum at 0.
@@ -48,13 +50,15 @@ struct FirstMoves {
 };
 
 // An amplitude becomes 0 if the run and its companion differ by more than half of it, and it is no larger than one
-// rounding of the place a step, from the beginning: what rests moves by that. `place`: the largest size of each number.
-void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& place,
+// rounding of the place a step, from the beginning: what rests moves by that. `places`: as above.
+void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& places,
                         double steps, double epsilon, const FirstMoves& first,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
 
-// The largest size of numbers in a range.
-std::vector<double> sizes_of(const std::vector<double>& least, const std::vector<double>& most);
+// What the rounding of numbers in a range is measured by: the largest size of each, or what constraints make of it
+// (constraint_sizes.hpp; empty: there are none).
+std::vector<double> places_of(const std::vector<double>& least, const std::vector<double>& most,
+                              const std::vector<double>& by_constraints);
 
 // Half of each range.
 std::vector<double> half_of(const std::vector<double>& least, const std::vector<double>& most);
@@ -62,6 +66,6 @@ std::vector<double> half_of(const std::vector<double>& least, const std::vector<
 // Half of each range, q then p, the largest of a group; 0: of what does not move, or by no more than rounding, which is
 // some epsilon of the place.
 std::vector<double> amplitudes_of(const std::vector<double>& least, const std::vector<double>& most,
-                                  const std::vector<int>& groups, double epsilon);
+                                  const std::vector<double>& places, const std::vector<int>& groups, double epsilon);
 
 }  // namespace lobatto

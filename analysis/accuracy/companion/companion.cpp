@@ -46,6 +46,8 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
       groups_(amplitude_groups(outline.scene)),
       rows_a_step_(1 + request.dense),
       narrow_(outline.system),
+      constraints_(outline.system),
+      parameters_(request.parameters),
       contacts_(outline.scene.is_cut(), request_) {
     narrow_.set_parameters(request.parameters);
     const auto all_of = [this](const std::vector<double>& whole, const std::vector<double>& doubles) {

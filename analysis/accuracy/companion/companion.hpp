@@ -30,6 +30,7 @@
 #include "analysis/accuracy/companion/measured_error.hpp"
 #include "analysis/accuracy/companion/place.hpp"
 #include "analysis/accuracy/companion/short_contacts.hpp"
+#include "analysis/accuracy/formulas/constraint_sizes.hpp"
 #include "analysis/accuracy/formulas/narrow_terms.hpp"
 #include "analysis/accuracy/formulas/pulses.hpp"
 #include "generator/mechanics/outline.hpp"
@@ -114,6 +115,8 @@ private:
     int rows_a_step_;
     std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
     NarrowTerms narrow_;         // likewise, where the motion meets them
+    ConstraintSizes constraints_;
+    std::vector<double> parameters_;
     std::vector<double> knots_;  // of measured values in time, at which its steps end
     std::int64_t looked_ = 0;    // at terms, along steps of the companion
     bool is_driven_ = false;     // explicit time

@@ -70,7 +70,15 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     for (std::size_t j = 0; j < comparisons; ++j)
         for (const std::vector<double>& row : {companion_ranges_[j].least, companion_ranges_[j].most})
             if (!row.empty()) widen_to(all.least, all.most, row.data(), row.size());
-    std::vector<double> shared = amplitudes_of(all.least, all.most, groups_, run_epsilon_);
+    std::vector<double> by_constraints;
+    constraints_.widen(by_constraints, request_.time, request_.q.data(), parameters_);
+    if (comparisons > 0) {
+        const Point& last = run_[comparisons - 1];
+        constraints_.widen(by_constraints, time_after(request_, last.steps), rounded(last.row, parts_).data(),
+                           parameters_);
+    }
+    const std::vector<double> places = places_of(all.least, all.most, by_constraints);
+    std::vector<double> shared = amplitudes_of(all.least, all.most, places, groups_, run_epsilon_);
     // What forces that cancel leave of one another moves a coordinate too, and tells nothing.
     NumberStepper stepper(kernel_);
     std::vector<double> T;
@@ -92,8 +100,7 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     leave_out_noise(shared, comparisons, start, pair);
     if (comparisons == 0) return shared;
     const Range& until_first = companion_ranges_.front();
-    leave_out_rounding(shared, comparisons, sizes_of(all.least, all.most), static_cast<double>(request_.steps),
-                       run_epsilon_,
+    leave_out_rounding(shared, comparisons, places, static_cast<double>(request_.steps), run_epsilon_,
                        {half_of(until_first.least, until_first.most), static_cast<double>(segment(0).steps)}, pair);
     return shared;
 }

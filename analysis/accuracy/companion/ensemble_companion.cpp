@@ -54,6 +54,7 @@ EnsembleCompanion::EnsembleCompanion(const Outline& outline, const Kernel& kerne
       request_(request),
       groups_(amplitude_groups(outline.scene)),
       narrow_(outline.system),
+      constraints_(outline.system),
       stepper_(plain) {}
 
 void EnsembleCompanion::compute(std::int64_t first) {
@@ -232,7 +233,12 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     const auto companion_at = [&](std::int64_t j) {
         return known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
     };
-    std::vector<double> amplitude = amplitudes_of(least, most, groups_, kernel_->epsilon);
+    std::vector<double> by_constraints;
+    for (const std::int64_t i : {std::int64_t(0), kept.count - 1})
+        if (const double* const row = kept.rows + i * kept.columns; kept.count > 0)
+            constraints_.widen(by_constraints, row[0], row + 1, start.parameters);
+    const std::vector<double> places = places_of(least, most, by_constraints);
+    std::vector<double> amplitude = amplitudes_of(least, most, places, groups_, kernel_->epsilon);
     const auto pair = [&](std::size_t j, std::size_t i) {
         const auto at = static_cast<std::int64_t>(j);
         return std::pair(run_at(at)[i * parts_], companion_at(at)[i * parts_]);
@@ -242,8 +248,8 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     if (comparisons > 0) {
         const auto first = known.ranges.begin(), middle = first + std::ssize(amplitude);
         leave_out_rounding(
-            amplitude, static_cast<std::size_t>(comparisons), sizes_of(least, most),
-            static_cast<double>(request_.steps), kernel_->epsilon,
+            amplitude, static_cast<std::size_t>(comparisons), places, static_cast<double>(request_.steps),
+            kernel_->epsilon,
             {half_of({first, middle}, {middle, middle + std::ssize(amplitude)}), static_cast<double>(every)}, pair);
     }
     const double ratio = request_.arrivals.interval != 0

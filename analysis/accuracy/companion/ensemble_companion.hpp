@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "analysis/accuracy/formulas/constraint_sizes.hpp"
 #include "analysis/accuracy/formulas/narrow_terms.hpp"
 #include "analysis/accuracy/formulas/pulses.hpp"
 #include "generator/mechanics/outline.hpp"
@@ -54,6 +55,7 @@ private:
     std::vector<double> pulse_parameters_;  // those that were asked for last
     bool has_pulses_ = false;               // with these
     NarrowTerms narrow_;
+    ConstraintSizes constraints_;
     LoadedStepper<double> stepper_;
     std::int64_t first_ = 0;
     double seconds_of_one_ = 0;  // that a companion took, of those computed last

@@ -74,6 +74,7 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
     };
     look_at(system.lagrangian);
     for (const ex& force : system.outer_force) look_at(force);
+    for (const Constraint& constraint : system.constraints) look_at(constraint.value);
     for (const auto& [place, mass] : system.momentum_v.entries())
         if (place.first == place.second) add(Kind::pole, mass);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Terms of the Lagrangian and of forces that may be narrower than a step along the motion: exp(u), tanh(u), powers of
-// u, tables, where u is smooth and holds the time, positions or velocities. Steps may jump over them and see nothing.
+// Terms of the Lagrangian, of forces and of constraints that may be narrower than a step along the motion: exp(u),
+// tanh(u), powers of u, tables, where u is smooth and holds the time, positions or velocities. Steps may jump over them
+// and see nothing.
 #pragma once
 
 #include <optional>

@@ -247,6 +247,7 @@ std::vector<Pulse> find_pulses(const Outline& outline, const std::vector<double>
     PulseFinder finder(system, parameters, begin, end, widest);
     finder.look_at(system.lagrangian);
     for (const ex& force : system.outer_force) finder.look_at(force);
+    for (const Constraint& constraint : system.constraints) finder.look_at(constraint.value);
     for (const Switch& one : outline.scene.switches) finder.look_at_side(one.value);
     return finder.pulses();
 }
@@ -258,6 +259,7 @@ std::vector<double> find_knots(const Outline& outline, const std::vector<double>
     PulseFinder finder(system, parameters, begin, end, 0);
     finder.look_at_tables(system.lagrangian);
     for (const ex& force : system.outer_force) finder.look_at_tables(force);
+    for (const Constraint& constraint : system.constraints) finder.look_at_tables(constraint.value);
     return finder.knots();
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Short events in the explicit time of a Lagrangian or a force: pulses, switches, near poles. Narrower than the
-// distance of a step's nodes they may fall between all of them, and no step tells that they are there; but formulas do.
-// And the knots of measured values in time, across which a step has less than its order.
+// Short events in the explicit time of a Lagrangian, a force or a constraint: pulses, switches, near poles. Narrower
+// than the distance of a step's nodes they may fall between all of them, and no step tells that they are there; but
+// formulas do. And the knots of measured values in time, across which a step has less than its order.
 #pragma once
 
 #include <vector>

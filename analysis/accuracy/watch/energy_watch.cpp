@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/accuracy/companion/at_rest.hpp"
 #include "analysis/accuracy/watch/exact_energy.hpp"
 
 namespace lobatto {
@@ -173,7 +174,9 @@ void EnergyWatch::restore(const std::vector<double>& saved) {
 std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
                                    const TrajectoryRequest& request) const {
     LoadedStepper<double> stepper(kernel);
-    if (leaving_.size() < 2 || stepper.prepare(request.parameters, request.step) != LOBATTO_OK) return "";
+    if (leaving_.size() < 2 || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
+        rests_on_constraints(outline.system, some_, request.parameters))
+        return "";
     ExactEnergy energy(outline, request.parameters);
     const auto energy_of = [&](const State& state) {
         return state.v.empty() ? std::nullopt : energy.at(state.q, state.v);

@@ -70,7 +70,8 @@ void Watch::restore(const std::vector<double>& saved) {
 }
 
 std::optional<double> Watch::discrete_error() const {
-    if (!discrete_) return std::nullopt;
+    if (!discrete_ || discrete_error_ > std::fabs(discrete_start_))
+        return std::nullopt;  // that it is 0 but for rounding
     return discrete_start_ == 0 ? discrete_error_ : discrete_error_ / std::fabs(discrete_start_);
 }
 

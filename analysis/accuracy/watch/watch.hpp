@@ -21,7 +21,8 @@ public:
     void observe(const Records& records);
     void look_at_end(const TrajectoryResult& result);  // whatever was skipped: the last state is compared
 
-    std::optional<double> discrete_error() const;  // largest |H_d - H_d(0)| / |H_d(0)|, of linear systems
+    // The largest |H_d - H_d(0)| / |H_d(0)|, of linear systems; nothing where H_d is rounding.
+    std::optional<double> discrete_error() const;
     std::optional<double> position_error() const;  // largest |q - exact q|, where the solution is known in closed form
     // What it has observed so far, for a run that continues.
     std::vector<double> save() const;

@@ -154,6 +154,8 @@ std::string curvature_text(const System& system) {
                                             : fmt::format("d2{}/d{}{}d{}", of, row, by_velocity ? "'" : "", column);
             return fmt::format("{}{} depends on the {}", slope, formula, on);
         }
+    if (!system.constraints.empty())
+        return "the constraint " + system.constraints.front().written + " pulls on coordinates";
     return "a force depends on the time";
 }
 

@@ -97,15 +97,18 @@ std::vector<int> find_cyclic(const Scene& scene, const System& system) {
             for (const auto& [place, value] : matrix->entries()) held = held || place.second == k;
         if (!held) cyclic.push_back(k);
     }
-    // Squared at most, all of them together: the second derivatives among them are free of them.
-    for (const auto& [place, value] : system.momentum_v.entries())
-        if (contains(cyclic, place.first) && contains(cyclic, place.second))
-            for (const int k : cyclic)
-                if (value.has(system.v[static_cast<std::size_t>(k)])) return {};
-    for (const auto& [place, value] : system.momentum_v.entries())
-        if (contains(cyclic, place.first) && !contains(cyclic, place.second))
-            for (const int k : cyclic)
-                if (value.has(system.v[static_cast<std::size_t>(k)])) return {};
+    // Squared at most, all of them together: no mass in which one of them stands holds the velocity of one.
+    const auto stands_in_masses = [&](int k) {
+        return std::any_of(
+            system.momentum_v.entries().begin(), system.momentum_v.entries().end(), [&](const auto& mass) {
+                return contains(cyclic, mass.first.first) && mass.second.has(system.v[static_cast<std::size_t>(k)]);
+            });
+    };
+    for (;;) {
+        const auto k = std::find_if(cyclic.begin(), cyclic.end(), stands_in_masses);
+        if (k == cyclic.end()) break;
+        cyclic.erase(k);
+    }
     // A force may still hold a cyclic velocity; then its coordinate stays.
     if (cyclic.size() > most_cyclic) cyclic.resize(most_cyclic);
     if (static_cast<int>(cyclic.size()) == system.n) cyclic.pop_back();

@@ -14,6 +14,7 @@
 
 #include "generator/formula/real.hpp"
 #include "generator/graph/notation.hpp"
+#include "generator/mechanics/algebra/summands.hpp"
 #include "generator/mechanics/system/dependence.hpp"
 #include "generator/mechanics/system/mass_equations.hpp"
 
@@ -127,7 +128,6 @@ private:
     }
 
     void differentiate_constraints() {
-        system_.constraints = scene_.constraints;
         if (system_.constraints.empty()) return;
         std::vector<ex> values;
         for (const Constraint& constraint : system_.constraints) {
@@ -268,7 +268,14 @@ System undifferentiated(const Scene& scene) {
     for (const Parameter& parameter : scene.parameters) system.parameters.push_back(parameter.symbol);
     system.inputs = scene.inputs();
     system.lagrangian = scene.lagrangian;
+    system.constraints = scene.constraints;
     return system;
+}
+
+std::vector<std::vector<ex>> System::constraint_summands() const {
+    std::vector<std::vector<ex>> summands;
+    for (const Constraint& constraint : constraints) summands.push_back(summands_of(constraint.value));
+    return summands;
 }
 
 std::vector<GiNaC::symbol> SystemOutline::motion() const {

@@ -21,11 +21,12 @@ class Formulas;
 
 // What is known of a system beside its second derivatives; all that those ask for who only run a kernel.
 struct SystemOutline : SystemSymbols {
-    GiNaC::ex lagrangian;                // L(q, v, t)
-    std::vector<GiNaC::ex> outer_force;  // n: F_k(q, v, t) of the scene
-    bool has_forces() const;             // one of them is not 0
-    std::vector<GiNaC::ex> momentum;     // n: p = dL/dv
-    SparseMatrix momentum_v;             // n x n: dp/dv, what vanishes identically left out
+    GiNaC::ex lagrangian;                 // L(q, v, t)
+    std::vector<GiNaC::ex> outer_force;   // n: F_k(q, v, t) of the scene
+    bool has_forces() const;              // one of them is not 0
+    std::vector<GiNaC::ex> momentum;      // n: p = dL/dv
+    SparseMatrix momentum_v;              // n x n: dp/dv, what vanishes identically left out
+    std::vector<Constraint> constraints;  // phi(q, t) = 0
 
     bool autonomous = true;  // neither L nor F nor a constraint depends on the time
     bool linear = false;     // p and f are affine in q and v, with constant coefficients
@@ -42,9 +43,10 @@ struct System : SystemOutline {
     // n x n each, what vanishes identically left out: dp/dq, df/dv, df/dq.
     SparseMatrix momentum_q, force_v, force_q;
 
-    std::vector<Constraint> constraints;  // phi(q, t) = 0
     std::vector<GiNaC::ex> constraint_t;  // dphi/dt at fixed q, one each
     SparseMatrix constraint_q;            // G = dphi/dq, one row each
+    // Of each constraint, what the rounding of phi is measured by (algebra/summands.hpp).
+    std::vector<std::vector<GiNaC::ex>> constraint_summands() const;
 
     // A graph that knows the derivatives above; its symbols have values of no meaning.
     std::shared_ptr<const Formulas> formulas;

@@ -15,6 +15,7 @@
 #include "../base/dense.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
+#include "constraint_rounding.hpp"
 #include "convergence.hpp"
 #include "extrapolation.hpp"
 #include "stage_map.hpp"
@@ -212,7 +213,7 @@ private:
         real v[n], multipliers[constraints * s];
         divide_by_mass(p, v);
         begin_step(k, time, q, v, multipliers, a);
-        set_measures(q, v, a);
+        set_measures(k, time, q, v, a);
         const real small = maximum(tolerance, Limits<real>::epsilon);
         const Convergence<real, 1, Pace<4, 70, 16>> rule{small};
         real e_before = Limits<real>::largest;
@@ -266,8 +267,9 @@ private:
     }
 
     // What increments of each coordinate are measured by: its position, its way in the step, and how far the equations
-    // it stands in move it when the coordinates beside it move by as much as they are measured by.
-    void set_measures(const real* q, const real* v, Arrays& a) const {
+    // it stands in move it when the coordinates beside it move by as much as they are measured by, or phi by as much as
+    // its terms.
+    void set_measures(const Coefficients& k, real time, const real* q, const real* v, Arrays& a) const {
         real own[n], joined[n] = {}, size[constraints] = {}, square[constraints] = {};
         const auto inverse = [&](int c) { return fabs(inverse_mass[c * n + c]); };
         for (int c = 0; c < n; ++c)
@@ -277,6 +279,7 @@ private:
             size[K::constraint_row[e]] += fabs(a.start_G[e]) * own[c];
             square[K::constraint_row[e]] += inverse(c) * (a.start_G[e] * a.start_G[e]);
         }
+        raise_to_summands<K>(k, time, q, size);
         for (int e = 0; e < slopes; ++e) {
             const int c = K::constraint_column[e], row = K::constraint_row[e];
             joined[c] += inverse(c) * fabs(a.start_G[e]) * (size[row] / maximum(square[row], Limits<real>::smallest));

@@ -5,6 +5,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "constraint_rounding.hpp"
 #include "galerkin_newton.hpp"
 
 namespace lobatto {
@@ -36,6 +37,17 @@ private:
         each_mass(M, [&](int k, real mass) { way[k] += sqrt(moved / mass); });
     }
 
+    // To half of the digits of their sizes, or to the rounding of their terms.
+    bool are_near_zero(const real* phi, const real* size, const real& time, const real* at) const {
+        real rounding[multiplier_room] = {};
+        raise_to_summands<K>(coefficients, time, at, rounding);
+        for (int c = 0; c < constraints; ++c)
+            if (!(fabs(phi[c]) <=
+                  Limits<real>::root_epsilon * size[c] + real(128) * Limits<real>::epsilon * rounding[c]))
+                return false;
+        return true;
+    }
+
 protected:
     // Whether a start keeps the constraints, to half of the digits; v, mu: its velocity and multipliers.
     Status check_constraints(const real* v, const real* mu) const {
@@ -51,14 +63,16 @@ protected:
                 size[c] += fabs(G[e]) * (fabs(q[k]) + way[k]);
                 force[k] += G[e] * mu[c];
             }
-            for (int c = 0; c < constraints; ++c)
-                if (!(fabs(phi[c]) <= Limits<real>::root_epsilon * size[c])) return Status::off_constraints;
-            real largest = real(0), apart = real(0);
+            if (!are_near_zero(phi, size, this->time(), q)) return Status::off_constraints;
+            real largest = real(0), apart = real(0), pushed = real(0), Lv[n], Lq[n];
+            Formulas<K>::slopes(coefficients, this->time(), q, v, Lv, Lq);
             for (int k = 0; k < n; ++k) {
                 largest = fabs(p[k]) > largest ? fabs(p[k]) : largest;
                 apart = fabs(force[k]) > apart ? fabs(force[k]) : apart;
+                pushed = fabs(step_size * Lq[k]) > pushed ? fabs(step_size * Lq[k]) : pushed;
             }
-            if (!(apart <= Limits<real>::root_epsilon * largest)) return Status::off_constraints;
+            const real rounding = real(64) * Limits<real>::epsilon * pushed;  // at rest steps leave that
+            if (!(apart <= Limits<real>::root_epsilon * largest + rounding)) return Status::off_constraints;
         }
         return Status::ok;
     }
@@ -79,9 +93,7 @@ protected:
         });
         for (int e = 0; e < K::constraint_entries; ++e)
             size[K::constraint_row[e]] += fabs(G[e]) * reach[K::constraint_column[e]];
-        for (int c = 0; c < constraints; ++c)
-            if (!(fabs(phi[c]) <= Limits<real>::root_epsilon * size[c])) return false;
-        return true;
+        return are_near_zero(phi, size, this->next_time(), q1);
     }
 };
 

@@ -7,6 +7,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "constraint_rounding.hpp"
 #include "convergence.hpp"
 #include "galerkin_equations.hpp"
 
@@ -153,12 +154,19 @@ private:
                 rounding[active * m + c] +=
                     fabs(step_size * K::b[i] * K::legendre_polynomial[i] * a.g[i * Z + 2 * active + c]);
         for (int b = 0; b < active; ++b) rounding[Layout::index(b, 0)] += fabs(p[K::active_index[b]]);
-        if constexpr (Tables::constraints > 0) {  // phi at positions that are rounded
+        if constexpr (Tables::constraints > 0) {  // phi, and at positions that are rounded
             for (int e = 0; e < K::entries; ++e)
                 if (Tables::kind(K::entry_row[e]) == Slot::multiplier)
                     for (int j = 0; j < m; ++j)
                         rounding[Layout::index(Tables::block(K::entry_row[e]), j)] +=
                             fabs(a.H[(j + 1) * entry_room + e] * a.z[(j + 1) * Z + K::entry_column[e]]);
+            for (int j = 0; j < m; ++j) {
+                real size[Tables::constraints];
+                for (int c = 0; c < Tables::constraints; ++c) size[c] = rounding[Layout::index(active + c, j)];
+                raise_to_summands<K>(coefficients, this->time() + K::control[j + 1] * step_size,
+                                     a.z + (j + 1) * Z + active, size);
+                for (int c = 0; c < Tables::constraints; ++c) rounding[Layout::index(active + c, j)] = size[c];
+            }
         }
         for (int i = 0; i < N; ++i) rounding[i] *= a.delta[i] < real(0) ? real(-1) : real(1);
         a.matrix.solve(rounding);

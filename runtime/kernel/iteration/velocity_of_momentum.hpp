@@ -174,16 +174,19 @@ private:
         return true;
     }
 
-    // Whether what is left is rounding beside the whole motion, in the metric of the mass: |p_i| <= sqrt(M_ii p v). The
-    // terms of one row may all be rounding, as those of a coordinate that a constraint holds fixed.
+    // Whether what is left is rounding beside the momentum and what constraints take of it, which may be all, or beside
+    // the whole motion, in the metric of the mass: |p_i| <= sqrt(M_ii p v). The terms of one row may all be rounding,
+    // as those of a coordinate that a constraint holds fixed.
     static bool is_rounding(const State& at, const Arrays& a) {
         real twice_energy = real(0), mass[n] = {}, size[unknowns] = {};
         for (int i = 0; i < n; ++i) twice_energy += fabs(at.p[i] * a.x[i]);
         for (int e = 0; e < K::mass_entries; ++e)
             if (K::mass_row[e] == K::mass_column[e]) mass[K::mass_row[e]] = fabs(a.mass[e]);
-        for (int i = 0; i < n; ++i) size[i] = sqrt(mass[i] * twice_energy);
+        for (int i = 0; i < n; ++i) size[i] = sqrt(mass[i] * twice_energy) + fabs(at.p[i]);
         each_slope([&](int e, int c, int i) {
-            if (mass[i] > real(0)) size[n + c] += fabs(a.G[e]) * sqrt(twice_energy / mass[i]);
+            size[i] += fabs(a.G[e] * a.x[n + c]);
+            if (mass[i] > real(0))
+                size[n + c] += fabs(a.G[e]) * (sqrt(twice_energy / mass[i]) + fabs(at.p[i]) / mass[i]);
         });
         for (int i = 0; i < unknowns; ++i)
             if (!(fabs(a.residual[i]) <= real(64) * Limits<real>::epsilon * size[i])) return false;

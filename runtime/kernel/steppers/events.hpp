@@ -344,6 +344,16 @@ private:
         return fabs(sample.value) <= change;
     }
 
+    // Whether a change of sign between two steps, from this value to that of the first sample, is a zero: the state
+    // goes on, so that both are small. At a pole, or where g jumps, they are not.
+    bool is_small_at_start(real before) const {
+        real largest = real(0);
+        for (int i = 0; i < sample_count; ++i)
+            if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
+        const real here = fabs(samples[0].value), few = real(0.125) * largest;
+        return here <= Limits<real>::root_epsilon * fabs(before) || (here <= few && fabs(before) <= few);
+    }
+
     // The changes of sign along the samples. A zero at a sample, or what is rounding there, is one if the sign beyond
     // it is another: else g only touches zero. Where g is not defined in between, nothing has happened.
     void walk(int e, real until) {
@@ -369,7 +379,7 @@ private:
                     if (K::event_direction[e] * direction >= 0) {
                         const int from = before >= 0 ? before : 0;
                         const bool is_exactly = zero >= 0 && samples[zero].value == real(0);
-                        bool is_root = true;
+                        bool is_root = i > 0 || is_small_at_start(last);
                         const real root = is_beyond    ? until
                                           : is_exactly ? samples[zero].theta
                                           : changes(samples[from].value, here.value)

@@ -71,10 +71,13 @@ struct SampledFunction {
     }
 
     // The root between a and b, to the rounding of theta: secants, with the value of an end that stays halved (the
-    // Illinois method), and every third time the middle. None where g grows: its sign changes at a pole.
+    // Illinois method), and every third time the middle. None where g grows, or changes at once: its sign changes at a
+    // pole, or where it jumps.
     template <class G>
     static real root_between(Sample a, Sample b, bool& is_root, const G& g) {
         const real largest = fabs(a.value) < fabs(b.value) ? fabs(b.value) : fabs(a.value);
+        const real change = fabs(b.value - a.value);
+        const bool may_tell = b.theta - a.theta > real(16) * rounding;
         Sample nearest = fabs(a.value) < fabs(b.value) ? a : b;
         real weight_a = real(1), weight_b = real(1);
         int stays = 0;  // the end that the last secant left in place: -1 is a, 1 is b
@@ -101,7 +104,8 @@ struct SampledFunction {
                 stays = 1;
             }
         }
-        is_root = is_finite(nearest.value) && fabs(nearest.value) <= largest;
+        const bool jumps = may_tell && nearest.value != real(0) && fabs(b.value - a.value) > real(0.5) * change;
+        is_root = is_finite(nearest.value) && fabs(nearest.value) <= largest && !jumps;
         return nearest.theta;
     }
 };

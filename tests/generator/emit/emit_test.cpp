@@ -420,6 +420,7 @@ TEST_CASE("the names that a scene may not take are those that kernels declare") 
                                                                                   {"pendulum", clean},
                                                                                   {"double_pendulum", lobatto_4},
                                                                                   {"lagrange_top", gauss_3},
+                                                                                  {"rod_pendulum", lobatto_4},
                                                                                   {"stiff_fput", lobatto_4},
                                                                                   {"fput_beta", lobatto_4}}) {
         Scene scene = read_scene(std::string(LOBATTO_SOURCE_DIR) + "/scenes/" + name + ".toml");

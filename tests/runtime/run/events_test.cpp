@@ -182,3 +182,20 @@ TEST_CASE("an event where a wall is happens at each impact") {
         }
     }
 }
+
+TEST_CASE("a change of sign in a jump or through infinity is no event, also where a switch cuts the step") {
+    for (const double step : {0.03, 0.1, 0.2, 0.31}) {
+        CAPTURE(step);
+        const Motion circle{"x'^2/2 - x^2/2", "position = 1, velocity = 0", "points = 6", step, 100};  // the angle is t
+        const auto turns = times_of(circle, {"atan2(-x', x) = 1 falling", "atan2(-x', x) = 1 rising"});
+        CHECK(turns[0].empty());
+        REQUIRE(turns[1].size() == 16);
+        for (std::size_t i = 0; i < 16; ++i)
+            CHECK(turns[1][i] == doctest::Approx(1 + 2 * std::numbers::pi * static_cast<double>(i)).epsilon(1e-8));
+        const auto slopes = times_of(circle, {"-x'/x = 1", "abs(x) = 0.5", "1/x = 0", "sign(x)*atan2(-x', x) = 3"});
+        CHECK(slopes[0].size() == 32);  // at pi/4 + k pi
+        CHECK(slopes[1].size() == 64);
+        CHECK(slopes[2].empty());
+        CHECK(slopes[3].size() == 16);  // at -3 + 2 k pi: beyond pi it is pi - ..., which jumps, too
+    }
+}

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Mechanisms that rest, or hardly move, at positions of 0: the terms of their constraints are far larger than their
+// positions, and rounding in these moves them.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/analysis/measured_scene.hpp"
+#include "tests/support.hpp"
+
+using namespace lobatto;
+using test::MeasuredScene;
+
+namespace {
+
+std::string over(double step, double until) {
+    return fmt::format("[run]\nstep = {}\nuntil = {}\nassemble = true\n", step, until);
+}
+
+// A plank of the mass 2 that hangs on two equal bars, which are not parallel; `velocity`: of the first.
+std::string trapeze(const std::string& velocity, const std::string& more = "") {
+    return "lagrangian = \"-9.81*(a.y + c.y + 2*b.y)\"\n[bodies]\n"
+           "a = { mass = 1, inertia = 0.1, position = [0.3, -0.4] }\n"
+           "b = { mass = 2, inertia = 0.2, position = [1.1, -0.8] }\n"
+           "c = { mass = 1, inertia = 0.1, position = [1.9, -0.4] }\n[joints]\n"
+           "h1 = { type = \"hinge\", bodies = [\"ground\", \"a\"], point = [0, 0]" +
+           velocity +
+           " }\nh2 = { type = \"hinge\", bodies = [\"a\", \"b\"], point = [0.6, -0.8] }\n"
+           "h3 = { type = \"hinge\", bodies = [\"ground\", \"c\"], point = [2.2, 0] }\n"
+           "h4 = { type = \"hinge\", bodies = [\"b\", \"c\"], point = [1.6, -0.8] }\n" +
+           more;
+}
+
+// A square of four bars, free in the plane: the angles of its joints stay 0.
+const std::string frame =
+    "[bodies]\na = { mass = 1, inertia = 0.1, position = [0.5, 0], velocity = [1, 0.3], angular_velocity = 1 }\n"
+    "b = { mass = 1, inertia = 0.1, position = [1, 0.5] }\nc = { mass = 1, inertia = 0.1, position = [0.5, 1] }\n"
+    "d = { mass = 1, inertia = 0.1, position = [0, 0.5] }\n[joints]\n"
+    "j1 = { type = \"hinge\", bodies = [\"a\", \"b\"], point = [1, 0] }\n"
+    "j2 = { type = \"hinge\", bodies = [\"b\", \"c\"], point = [1, 1] }\n"
+    "j3 = { type = \"hinge\", bodies = [\"a\", \"d\"], point = [0, 0] }\n"
+    "j4 = { type = \"hinge\", bodies = [\"d\", \"c\"], point = [0, 1] }\n";
+
+// A plate on three ropes, at rest.
+const std::string plate =
+    "lagrangian = \"-9.81*2*p.z\"\n[bodies]\np = { mass = 2, inertia = [0.1, 0.1, 0.2], position = [0, 0, -1] }\n"
+    "[joints]\na = { type = \"distance\", bodies = [\"ground\", \"p\"], from = [1, 0, 0], to = [1, 0, -1] }\n"
+    "b = { type = \"distance\", bodies = [\"ground\", \"p\"], from = [-0.5, 0.8, 0], to = [-0.5, 0.8, -1] }\n"
+    "c = { type = \"distance\", bodies = [\"ground\", \"p\"], from = [-0.5, -0.8, 0], to = [-0.5, -0.8, -1] }\n";
+
+// Two points on three rods, at rest.
+const std::string rods =
+    "lagrangian = \"sum(i=1..2, m*(x[i]'^2 + y[i]'^2)/2 - m*9.81*y[i])\"\n[coordinates]\n"
+    "x = { position = [0.6, 1.6], velocity = 0 }\ny = { position = [-0.8, -0.8], velocity = 0 }\n[parameters]\n"
+    "m = 0.37\n[constraints]\na = \"x[1]^2 + y[1]^2 = 1\"\nb = \"(x[1] - x[2])^2 + (y[1] - y[2])^2 = 1\"\n"
+    "c = \"(x[2] - 2.2)^2 + y[2]^2 = 1\"\n";
+
+// What is printed of the whole run, as a part of the amplitude.
+double printed(const test::Finished& finished) {
+    const std::string row = "measured error          ";
+    const std::size_t at = finished.out.find(row);
+    return at == std::string::npos ? HUGE_VAL : std::strtod(finished.out.c_str() + at + row.size(), nullptr);
+}
+
+}  // namespace
+
+TEST_CASE("a closed chain at rest, or one that turns as a whole, runs and knows its error") {
+    for (const std::string& text :
+         {frame + over(0.01, 5), frame + over(0.05, 5), trapeze("") + over(0.01, 5), plate + over(0.01, 5),
+          rods + over(0.01, 5), trapeze("", "[forces]\n\"h1.angle\" = \"-2*h1.angle'\"\n") + over(0.02, 5)}) {
+        INFO(text);
+        const MeasuredScene scene(text);
+        const test::Finished finished = scene.run();
+        INFO(finished.err);
+        CHECK(finished.exit_code == 0);
+        CHECK(finished.err.find("warning") == std::string::npos);
+        CHECK(printed(finished) < 1e-11);
+    }
+}
+
+TEST_CASE("a mechanism whose motion dies away runs on at rest") {
+    const MeasuredScene scene(trapeze(", velocity = 1", "[forces]\n\"h1.angle\" = \"-2*h1.angle'\"\n") +
+                              over(0.02, 60));
+    const test::Finished finished = scene.run();
+    INFO(finished.err);
+    CHECK(finished.exit_code == 0);
+    CHECK(std::fabs(scene.end()[1]) < 1e-12);
+}
+
+TEST_CASE("small swings of a closed chain are as good as rounding in its constraints lets them be") {
+    for (const double velocity : {1e-3, 1e-5, 1e-7}) {
+        CAPTURE(velocity);
+        const MeasuredScene scene(trapeze(fmt::format(", velocity = {}", velocity)) + over(0.01, 5));
+        const test::Finished finished = scene.run();
+        INFO(finished.err);
+        REQUIRE(finished.exit_code == 0);
+        CHECK(printed(finished) < 1e-14 / velocity);
+    }
+}
+
+TEST_CASE("a pendulum that hangs at rest may be watched where it is") {
+    const MeasuredScene scene(
+        "lagrangian = \"(x'^2 + y'^2)/2 - 9.80665*y\"\n[coordinates]\nx = { position = 0, velocity = 0 }\n"
+        "y = { position = -2, velocity = 0 }\n[constraints]\nrod = \"x^2 + y^2 = 4\"\n[output]\n"
+        "events = [\"x = 0 rising\"]\n" +
+        over(0.05, 5));
+    const test::Finished finished = scene.run();
+    INFO(finished.err);
+    CHECK(finished.exit_code == 0);
+}
+
+TEST_CASE("what is narrow in a constraint is not missed") {
+    // A bump on a parabola, and a jerk of a pivot, both far shorter than a step.
+    const std::string bump =
+                          "lagrangian = \"(x'^2 + y'^2)/2 - 9.81*y\"\n[coordinates]\n"
+                          "x = { position = -1, velocity = 0 }\ny = { position = 1, velocity = 0 }\n[constraints]\n"
+                          "c = \"y - x^2 - 0.2*exp(-((x - 0.3013)/0.0005)^2) = 0\"\n[method]\npoints = 5\n",
+                      jerk =
+                          "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 - 9.81*y\"\n[coordinates]\n"
+                          "x = { position = 0.6, velocity = 0 }\ny = { position = -0.8, velocity = 0 }\n[constraints]\n"
+                          "c = \"(x - 0.5*exp(-((t - 2.013)/0.001)^2))^2 + y^2 = 1\"\n";
+    for (const std::string& text :
+         {bump + over(0.025, 3), bump + over(0.04, 3), jerk + over(0.2, 5), jerk + over(0.125, 5)}) {
+        INFO(text);
+        CHECK(MeasuredScene(text).run().exit_code == 3);
+    }
+}
+
+TEST_CASE("steps of mechanisms at rest are proved" * doctest::test_suite("slow")) {
+    for (const std::string& text : {trapeze(", velocity = 1e-5") + over(0.01, 5), rods + over(0.01, 5)}) {
+        INFO(text);
+        const MeasuredScene scene(text);
+        const test::Finished proved = test::run({LOBATTO_PROGRAM, "verify", scene.folder / "scene.toml"});
+        CHECK_MESSAGE(proved.exit_code == 0, proved.out);
+    }
+}
+
+TEST_CASE("tune measures a mechanism at rest by the size of what holds it" * doctest::test_suite("slow")) {
+    const MeasuredScene scene(rods + over(0.01, 5));
+    const test::Finished tuned =
+        test::run({LOBATTO_PROGRAM, "tune", scene.folder / "scene.toml", "--error", "1e-6", "--budget", "600"});
+    CHECK_MESSAGE(tuned.exit_code == 0, tuned.err);
+}
