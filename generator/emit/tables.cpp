@@ -43,6 +43,16 @@ std::vector<std::pair<int, int>> places_of(const SparseMatrix& matrix) {
     return result;
 }
 
+// Which formula each of the summands belongs to.
+std::string summand_rows(const std::string& of, const std::vector<std::vector<GiNaC::ex>>& summands) {
+    std::vector<int> rows;
+    int row = 0;
+    for (const std::vector<GiNaC::ex>& of_one : summands) rows.insert(rows.end(), of_one.size(), row++);
+    std::string text;
+    line(text, fmt::format("int {}_summand_count = {}", of, rows.size()), "by which rounding in formulas is measured");
+    return text + integer_table(of + "_summand_row", rows);
+}
+
 std::string separable_shapes(const Structure& structure, const System& system, int nodes, Precision precision) {
     std::string text;
     line(text, fmt::format("int points = {}", nodes), "nodes of a step, both ends included");
@@ -105,13 +115,9 @@ std::string general_shapes(const Derivation& d) {
     line(text, fmt::format("int constraint_entries = {}", slopes.size()),
          "of G = dphi/dq that are not identically zero");
     text += places("constraint", slopes);
-    if (d.system.constraints.empty()) return text;
-    std::vector<int> rows;
-    int row = 0;
-    for (const std::vector<GiNaC::ex>& of_one : d.system.constraint_summands())
-        rows.insert(rows.end(), of_one.size(), row++);
-    line(text, fmt::format("int summand_count = {}", rows.size()), "by which the rounding of phi is measured");
-    return text + integer_table("summand_row", rows);
+    if (!d.system.constraints.empty()) text += summand_rows("constraint", d.system.constraint_summands());
+    if (!hamiltonian && d.system.momenta_cancel()) text += summand_rows("momentum", d.system.momentum_summands());
+    return text;
 }
 
 // Where the unknowns of each coordinate stand, and the groups that are solved by themselves.

@@ -80,6 +80,7 @@ private:
             ++e;
         }
         p_.programs.push_back(std::move(legendre));
+        if (!bodies && d_.system.momenta_cancel()) summands("momentum_summands", d_.system.momentum_summands());
         if (!bodies) p_.programs.push_back(std::move(stage));
         constraints();
         if (d_.scene.clock) p_.programs.push_back({"clock", {{"", convert(d_.scene.clock->rate), Effect::give_back}}});
@@ -176,18 +177,23 @@ private:
         for (const auto& [place, slope] : d_.system.constraint_q.entries())
             program.outputs.push_back({at("G", e++), convert(slope)});
         p_.programs.push_back(std::move(program));
-        Program summands{"summands", {}};
-        e = 0;
-        for (const std::vector<ex>& of_one : d_.system.constraint_summands()) {
+        summands("constraint_summands", d_.system.constraint_summands());
+        multiplier_terms();
+    }
+
+    // In an order that is the same everywhere.
+    void summands(const std::string& name, const std::vector<std::vector<ex>>& of_all) {
+        Program program{name, {}};
+        std::size_t e = 0;
+        for (const std::vector<ex>& of_one : of_all) {
             Ids ids;
             for (const ex& summand : of_one) ids.push_back(convert(summand));
             for (Id& id : ids)
                 if (g().is_negative(id)) id = g().negate(id);
             std::sort(ids.begin(), ids.end(), [this](Id a, Id b) { return g().compare(a, b) < 0; });
-            for (const Id id : ids) summands.outputs.push_back({at("T", e++), id});
+            for (const Id id : ids) program.outputs.push_back({at("T", e++), id});
         }
-        p_.programs.push_back(std::move(summands));
-        multiplier_terms();
+        p_.programs.push_back(std::move(program));
     }
 
     // (D49) The right sides of the equations for accelerations and multipliers.

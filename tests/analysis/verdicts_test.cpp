@@ -89,3 +89,19 @@ TEST_CASE("a Lagrangian that jumps has no motion there, and a run says so") {
               "the Lagrangian jumps, by about 0.001, where if in the Lagrangian (line 1 column 38) goes from one "
               "piece to the other") != std::string::npos);
 }
+
+TEST_CASE("a momentum that is a difference at rest has its velocity where the motion turns") {
+    for (const std::string lagrangian : {"exp(x') - x' - x^2/2", "1/(2 - x') - x'/4 - x^2/8"}) {
+        CAPTURE(lagrangian);
+        const std::string scene = "lagrangian = \"" + lagrangian +
+                                  "\"\n[coordinates]\nx = { position = 0.5, velocity = 0 }\n[method]\npoints = 5\n"
+                                  "[run]\nstep = 0.05\nuntil = 20\n";
+        const test::Finished alone = run(scene);
+        CHECK_MESSAGE(alone.exit_code == 0, alone.err);
+        CHECK(alone.err == "");
+        const test::TemporaryFolder folder;
+        test::write_text(folder / "scene.toml", scene);
+        const test::Finished proved = test::run({LOBATTO_PROGRAM, "verify", folder / "scene.toml"});
+        CHECK_MESSAGE(proved.exit_code == 0, proved.out << proved.err);
+    }
+}

@@ -278,6 +278,26 @@ std::vector<std::vector<ex>> System::constraint_summands() const {
     return summands;
 }
 
+std::vector<std::vector<ex>> System::momentum_summands() const {
+    std::vector<std::vector<ex>> summands;
+    for (const ex& p : momentum) summands.push_back(summands_of(p));
+    return summands;
+}
+
+bool System::momenta_cancel() const {
+    try {
+        const std::vector<ex> rest = all_at(momentum, v, 0);
+        std::vector<ex> summands;
+        for (std::size_t k = 0; k < momentum.size(); ++k)
+            if (rest[k].is_zero())
+                for (const ex& summand : summands_of(momentum[k])) summands.push_back(summand);
+        summands = all_at(summands, v, 0);
+        return !std::all_of(summands.begin(), summands.end(), [](const ex& summand) { return summand.is_zero(); });
+    } catch (const std::domain_error&) {  // no value at rest
+        return false;
+    }
+}
+
 std::vector<GiNaC::symbol> SystemOutline::motion() const {
     Symbols all = q;
     all.insert(all.end(), v.begin(), v.end());

@@ -45,8 +45,10 @@ struct System : SystemOutline {
 
     std::vector<GiNaC::ex> constraint_t;  // dphi/dt at fixed q, one each
     SparseMatrix constraint_q;            // G = dphi/dq, one row each
-    // Of each constraint, what the rounding of phi is measured by (algebra/summands.hpp).
-    std::vector<std::vector<GiNaC::ex>> constraint_summands() const;
+    // Of each constraint and momentum, what its rounding is measured by (algebra/summands.hpp).
+    std::vector<std::vector<GiNaC::ex>> constraint_summands() const, momentum_summands() const;
+    // Whether a momentum is 0 at rest and its summands are not, as of exp(v) - v: then it is rounding there.
+    bool momenta_cancel() const;
 
     // A graph that knows the derivatives above; its symbols have values of no meaning.
     std::shared_ptr<const Formulas> formulas;

@@ -13,12 +13,12 @@ namespace lobatto {
 template <class K, class Coefficients, class real>
 LOBATTO_APART void raise_to_summands(const Coefficients& k, [[maybe_unused]] const real& time, const real* q,
                                      real* size) {
-    real T[K::summand_count], all[K::constraints] = {};
+    real T[K::constraint_summand_count], all[K::constraints] = {};
     if constexpr (K::autonomous)
-        K::summands(k, q, T);
+        K::constraint_summands(k, q, T);
     else
-        K::summands(k, time, q, T);
-    for (int e = 0; e < K::summand_count; ++e) all[K::summand_row[e]] += fabs(T[e]);
+        K::constraint_summands(k, time, q, T);
+    for (int e = 0; e < K::constraint_summand_count; ++e) all[K::constraint_summand_row[e]] += fabs(T[e]);
     for (int c = 0; c < K::constraints; ++c) size[c] = maximum(size[c], real(0.5) * all[c]);
 }
 

@@ -15,6 +15,12 @@
 
 namespace lobatto {
 
+// Whether momenta are 0 at rest as differences of terms that are not, as exp(v) - 1 is.
+template <class K, class = void>
+struct MomentaCancel : std::false_type {};
+template <class K>
+struct MomentaCancel<K, std::void_t<decltype(K::momentum_summand_count)>> : std::true_type {};
+
 template <class K>
 class VelocityOfMomentum {
 public:
@@ -174,9 +180,9 @@ private:
         return true;
     }
 
-    // Whether what is left is rounding beside the momentum and what constraints take of it, which may be all, or beside
-    // the whole motion, in the metric of the mass: |p_i| <= sqrt(M_ii p v). The terms of one row may all be rounding,
-    // as those of a coordinate that a constraint holds fixed.
+    // Whether what is left is rounding: of the terms of p, where these cancel at rest, beside the momentum and what
+    // constraints take of it, which may be all, or beside the whole motion, in the metric of the mass: |p_i| <=
+    // sqrt(M_ii p v). The terms of one row may all be rounding, as those of a coordinate that a constraint holds fixed.
     static bool is_rounding(const State& at, const Arrays& a) {
         real twice_energy = real(0), mass[n] = {}, size[unknowns] = {};
         for (int i = 0; i < n; ++i) twice_energy += fabs(at.p[i] * a.x[i]);
@@ -188,6 +194,15 @@ private:
             if (mass[i] > real(0))
                 size[n + c] += fabs(a.G[e]) * (sqrt(twice_energy / mass[i]) + fabs(at.p[i]) / mass[i]);
         });
+        if constexpr (MomentaCancel<K>::value) {
+            real T[K::momentum_summand_count];
+            if constexpr (K::autonomous)
+                K::momentum_summands(at.k, at.q, a.x, T);
+            else
+                K::momentum_summands(at.k, at.time, at.q, a.x, T);
+            for (int e = 0; e < K::momentum_summand_count; ++e)
+                size[K::momentum_summand_row[e]] += real(0.5) * fabs(T[e]);
+        }
         for (int i = 0; i < unknowns; ++i)
             if (!(fabs(a.residual[i]) <= real(64) * Limits<real>::epsilon * size[i])) return false;
         return true;

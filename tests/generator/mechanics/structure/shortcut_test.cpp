@@ -208,6 +208,15 @@ TEST_CASE("cyclic coordinates leave the solve, their momenta stay to the last bi
     }
 }
 
+TEST_CASE("a coordinate whose velocity stands in masses stays in the solve, and the other cyclic ones leave it") {
+    const Derivation found =
+        derive(read_scene(Source("scene.toml",
+                                 "lagrangian = \"r'^2/2 + r^2*phi'^2/2 + phi'^4/20 - r^4/4 + w'^2\"\n[coordinates]\n"
+                                 "r = { position = 1, velocity = 0 }\nphi = { position = 0, velocity = 0.6 }\n"
+                                 "w = { position = 0, velocity = 0.1 }\n[run]\nstep = 0.05\nuntil = 10\n")));
+    CHECK(found.structure.routhian().cyclic == std::vector<int>{2});
+}
+
 TEST_CASE("a cyclic coordinate stays in the solve where its mass may vanish though the whole mass matrix does not") {
     const auto cyclic_of = [](const std::string& lagrangian) {
         const Derivation derivation = derive(scene("lagrangian = \"" + lagrangian +
