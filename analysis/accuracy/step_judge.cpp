@@ -139,7 +139,8 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
     const ConstraintSizes constraints(outline.system);
     for (const auto& [place, state] : some_)
         constraints.widen(by_constraints, state.row[0], state.row.data() + 1, request.parameters);
-    const std::vector<bool> moves = moving(least_, most_, places_of(least_, most_, by_constraints));
+    const std::vector<bool> moves =
+        moving(least_, most_, places_of(least_, most_, by_constraints), rounding_of_run(kernel->epsilon));
     std::vector<double> measure = scale, sizes(2 * n, 0.0);
     for (std::size_t i = 0; i < 2 * n; ++i)
         if (moves[i]) sizes[i] = scale[i];

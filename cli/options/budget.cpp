@@ -12,7 +12,9 @@
 namespace lobatto {
 
 void BudgetOption::add_to(Command& command) {
-    command.option("--budget", text, "Time it may take, as in 30s or 5min").shown_as("TIME").show_default();
+    command.option("--budget", text, "Time it may take, beside compiling what is measured first, as in 30s or 5min")
+        .shown_as("TIME")
+        .show_default();
 }
 
 double BudgetOption::seconds() const {

@@ -188,8 +188,11 @@ private:
         for (const std::vector<ex>& of_one : of_all) {
             Ids ids;
             for (const ex& summand : of_one) ids.push_back(convert(summand));
-            for (Id& id : ids)
-                if (g().is_negative(id)) id = g().negate(id);
+            for (Id& id : ids) {
+                const Id other = g().negate(id);
+                const bool is_sum = g()[id].op == Op::add && g()[other].op == Op::add;
+                if (g().is_negative(id) || (is_sum && g().compare(other, id) < 0)) id = other;
+            }
             std::sort(ids.begin(), ids.end(), [this](Id a, Id b) { return g().compare(a, b) < 0; });
             for (const Id id : ids) program.outputs.push_back({at("T", e++), id});
         }

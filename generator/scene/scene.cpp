@@ -341,6 +341,7 @@ GiNaC::ex Scene::along_motion(GiNaC::ex formula) const {
 GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,
                                const std::vector<GiNaC::ex>& given) const {
     try {
+        if (symbols_of(expression).empty()) return real_value(expression, {});  // as values of most parameters
         return real_value(expression, values_of(parameters, given));
     } catch (const NoValue& error) {
         throw InputError(fmt::format("{}: {} has no finite real value: {}", printable(path), what, error.what()));

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
+#include <set>
 
 #include "generator/formula/real.hpp"
 #include "generator/formula/text/token.hpp"
@@ -166,9 +168,14 @@ void SystemReader::read_definitions() {
         definitions.push_back(definition.get());
         definition_lines_.emplace_back(&added, &entry);
     }
+    std::set<std::string> used;
+    for (const auto& [name, known] : names_.all)
+        if (known.used) used.insert(name);
     for (std::size_t k = 0; k < entries.size(); ++k)
         definitions[k]->formula = parse_formula(source_, formula_of(source_, entries[k]),
                                                 {&names_, definitions[k]->label, true, definitions[k]->indices});
+    for (auto& [name, known] : names_.all)
+        known.used = used.contains(name);  // what definitions hold: see refuse_unused
 }
 
 // Bodies bring their kinetic energy.
@@ -220,14 +227,26 @@ void SystemReader::read_places() {
 }
 
 void SystemReader::refuse_unused() const {
+    // Formulas use names, and what the definitions hold that they use.
+    std::set<const Name*> used;
+    std::function<void(const Syntax&)> use_names_in;
+    const auto use = [&](const Name& name) {
+        if (used.insert(&name).second && name.definition) use_names_in(name.definition->formula);
+    };
+    use_names_in = [&](const Syntax& formula) {
+        if (formula.name != nullptr) use(*formula.name);
+        for (const Syntax& operand : formula.operands) use_names_in(operand);
+    };
+    for (const auto& [name, known] : names_.all)
+        if (known.used) use(known);
     for (const auto& [name, entry] : definition_lines_)
-        if (!name->used)
+        if (!used.contains(name))
             fail(entry->at, fmt::format("definition {} occurs in no formula; use it or remove it", entry->key));
     for (const auto& [name, what] : {std::pair{"parameters", "parameter"}, std::pair{"inputs", "input"}}) {
         const Entry* section = root_.find(name);
         if (section == nullptr) continue;
         for (const Entry& entry : section->value.entries)
-            if (!names_.all.at(entry.key).used)
+            if (!used.contains(&names_.all.at(entry.key)))
                 fail(entry.at, fmt::format("{} {} occurs in no formula; use it or remove it", what, entry.key));
     }
 }

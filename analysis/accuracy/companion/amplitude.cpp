@@ -57,6 +57,10 @@ std::vector<bool> moving(const std::vector<double>& least, const std::vector<dou
     return moves;
 }
 
+double rounding_of_run(double epsilon) {
+    return std::fmax(0x1p-40, few_roundings * epsilon);
+}
+
 std::vector<double> noise_levels(const std::vector<double>& sizes) {
     const auto middle = sizes.begin() + std::ssize(sizes) / 2;
     std::vector<double> levels;

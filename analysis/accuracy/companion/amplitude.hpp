@@ -30,7 +30,9 @@ void widen_to(std::vector<double>& least, std::vector<double>& most, const doubl
 // Of q then p: which move by more than rounding does, which is this part of their place. `places`: of each number
 // (places_of).
 std::vector<bool> moving(const std::vector<double>& least, const std::vector<double>& most,
-                         const std::vector<double>& places, double rounding = 0x1p-40);
+                         const std::vector<double>& places, double rounding);
+// That part for all steps of a run together, in numbers with this epsilon.
+double rounding_of_run(double epsilon);
 
 // For each number `noise` times the largest size of its kind, positions or momenta. A number that moves by less may be
 // moved by rounding alone: forces may cancel, and constraints may hold a momentum at 0.

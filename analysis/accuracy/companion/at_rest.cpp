@@ -9,7 +9,7 @@
 namespace lobatto {
 
 bool rests_on_constraints(const SystemOutline& system, const std::vector<std::vector<double>>& rows,
-                          const std::vector<double>& parameters) {
+                          const std::vector<double>& parameters, double epsilon) {
     if (system.constraints.empty() || rows.empty()) return false;
     const ConstraintSizes constraints(system);
     std::vector<double> least, most, sizes;
@@ -17,7 +17,7 @@ bool rests_on_constraints(const SystemOutline& system, const std::vector<std::ve
         widen_to(least, most, row.data() + 1, row.size() - 1);
         constraints.widen(sizes, row[0], row.data() + 1, parameters);
     }
-    const std::vector<bool> moves = moving(least, most, places_of(least, most, sizes));
+    const std::vector<bool> moves = moving(least, most, places_of(least, most, sizes), rounding_of_run(epsilon));
     return std::none_of(moves.begin(), moves.begin() + std::ssize(moves) / 2, [](bool any) { return any; });
 }
 

@@ -9,8 +9,8 @@
 
 namespace lobatto {
 
-// `rows`: states t, q, p. False without constraints.
+// `rows`: states t, q, p, computed in numbers with this epsilon. False without constraints.
 bool rests_on_constraints(const SystemOutline& system, const std::vector<std::vector<double>>& rows,
-                          const std::vector<double>& parameters);
+                          const std::vector<double>& parameters, double epsilon);
 
 }  // namespace lobatto

@@ -72,11 +72,9 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
             if (!row.empty()) widen_to(all.least, all.most, row.data(), row.size());
     std::vector<double> by_constraints;
     constraints_.widen(by_constraints, request_.time, request_.q.data(), parameters_);
-    if (comparisons > 0) {
-        const Point& last = run_[comparisons - 1];
-        constraints_.widen(by_constraints, time_after(request_, last.steps), rounded(last.row, parts_).data(),
+    for (std::size_t j = 0; j < comparisons && !constraints_.empty(); ++j)
+        constraints_.widen(by_constraints, time_after(request_, run_[j].steps), rounded(run_[j].row, parts_).data(),
                            parameters_);
-    }
     const std::vector<double> places = places_of(all.least, all.most, by_constraints);
     std::vector<double> shared = amplitudes_of(all.least, all.most, places, groups_, run_epsilon_);
     // What forces that cancel leave of one another moves a coordinate too, and tells nothing.

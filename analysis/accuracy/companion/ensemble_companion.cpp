@@ -234,9 +234,10 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
         return known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
     };
     std::vector<double> by_constraints;
-    for (const std::int64_t i : {std::int64_t(0), kept.count - 1})
-        if (const double* const row = kept.rows + i * kept.columns; kept.count > 0)
-            constraints_.widen(by_constraints, row[0], row + 1, start.parameters);
+    for (std::int64_t i = 0; i < kept.count && !constraints_.empty(); ++i) {
+        const double* const row = kept.rows + i * kept.columns;
+        constraints_.widen(by_constraints, row[0], row + 1, start.parameters);
+    }
     const std::vector<double> places = places_of(least, most, by_constraints);
     std::vector<double> amplitude = amplitudes_of(least, most, places, groups_, kernel_->epsilon);
     const auto pair = [&](std::size_t j, std::size_t i) {

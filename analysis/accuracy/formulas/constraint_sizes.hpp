@@ -13,6 +13,7 @@ namespace lobatto {
 class ConstraintSizes {
 public:
     explicit ConstraintSizes(const SystemOutline& system);
+    bool empty() const { return rows_.empty(); }
 
     // Takes a state into `sizes`, n of positions and n of momenta, by which the rounding of each is measured: of a
     // position S w |G_k| / sum_j w_j G_j^2, with S the sizes of the summands of phi, G = dphi/dq and w one over masses.

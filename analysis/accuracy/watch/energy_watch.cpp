@@ -175,7 +175,7 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
                                    const TrajectoryRequest& request) const {
     LoadedStepper<double> stepper(kernel);
     if (leaving_.size() < 2 || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
-        rests_on_constraints(outline.system, some_, request.parameters))
+        rests_on_constraints(outline.system, some_, request.parameters, kernel->epsilon))
         return "";
     ExactEnergy energy(outline, request.parameters);
     const auto energy_of = [&](const State& state) {

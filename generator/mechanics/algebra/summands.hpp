@@ -9,8 +9,8 @@
 
 namespace lobatto {
 
-// Each once, but for its sign, of the sums in f, and of those in its factors, powers and functions: (x - a)^2 + b has
-// 2 (x - a) x, 2 (x - a) a, (x - a)^2 and b. Of what is no sum, f too.
+// Each once, but for its sign, of the sums in f, and of those in its factors, bases of powers and functions: (x - a)^2
+// + b has 2 (x - a) x, 2 (x - a) a, (x - a)^2 and b. Of what is no sum, f too. Their order is not the same everywhere.
 std::vector<GiNaC::ex> summands_of(const GiNaC::ex& f);
 
 }  // namespace lobatto

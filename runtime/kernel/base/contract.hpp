@@ -26,7 +26,7 @@
 //   hold no velocity, `scaled_mass` that M is a function times a constant matrix: then `stage` gives one over the first
 //   entry of M in place of M. `hamiltonian` that velocity(k, q, p, velocity) and force(k, q, velocity, p, F) are
 //   formulas, which take the place of `stage`. `angles`: how many sines and cosines `stage` takes as a last argument
-//   (base/angles.hpp). constraint_summands and momentum_summands tell by what rounding there is measured.
+//   (base/angles.hpp). constraint_summands: what rounds phi; momentum_summands: what rounds p, if it cancels at rest.
 #ifndef LOBATTO_KERNEL_CONTRACT_HPP
 #define LOBATTO_KERNEL_CONTRACT_HPP
 

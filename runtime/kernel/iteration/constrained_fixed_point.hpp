@@ -43,7 +43,7 @@ struct ConstrainedFixedPoint {
             W[parts * n], pull[parts * constraints];
         real flat[n * lanes], off[constraints * lanes], measure[n], inverse_scale[n], start_W[n];
         real start_f[n], start_phi[constraints], start_phi_t[constraints], start_G[slopes];
-        real B[constraints * constraints];
+        real B[constraints * constraints], terms[constraints];
         std::int32_t pivots[constraints];
     };
 
@@ -268,9 +268,9 @@ private:
 
     // What increments of each coordinate are measured by: its position, its way in the step, and how far the equations
     // it stands in move it when the coordinates beside it move by as much as they are measured by, or phi by as much as
-    // its terms.
+    // its terms. `measure`: without these.
     void set_measures(const Coefficients& k, real time, const real* q, const real* v, Arrays& a) const {
-        real own[n], joined[n] = {}, size[constraints] = {}, square[constraints] = {};
+        real own[n], joined[n] = {}, raised[n] = {}, size[constraints] = {}, square[constraints] = {};
         const auto inverse = [&](int c) { return fabs(inverse_mass[c * n + c]); };
         for (int c = 0; c < n; ++c)
             own[c] = maximum(fabs(h * v[c]) + h * (h * inverse(c)) * fabs(a.start_f[c]), fabs(q[c]));
@@ -279,24 +279,29 @@ private:
             size[K::constraint_row[e]] += fabs(a.start_G[e]) * own[c];
             square[K::constraint_row[e]] += inverse(c) * (a.start_G[e] * a.start_G[e]);
         }
-        raise_to_summands<K>(k, time, q, size);
+        for (int c = 0; c < constraints; ++c) a.terms[c] = size[c];
+        raise_to_summands<K>(k, time, q, a.terms);
         for (int e = 0; e < slopes; ++e) {
             const int c = K::constraint_column[e], row = K::constraint_row[e];
-            joined[c] += inverse(c) * fabs(a.start_G[e]) * (size[row] / maximum(square[row], Limits<real>::smallest));
+            const real pull = inverse(c) * fabs(a.start_G[e]), of_row = maximum(square[row], Limits<real>::smallest);
+            joined[c] += pull * (size[row] / of_row);
+            raised[c] += pull * (a.terms[row] / of_row);
         }
         for (int c = 0; c < n; ++c) {
             a.measure[c] = maximum(own[c] + joined[c], Limits<real>::smallest);
-            a.inverse_scale[c] = real(1) / a.measure[c];
+            a.inverse_scale[c] = real(1) / maximum(own[c] + raised[c], Limits<real>::smallest);
         }
     }
 
-    // Whether the positions found keep the constraints, to half of the digits of what they are measured by. Where
-    // constraints depend on one another, multipliers grow until corrections are lost in their rounding: nothing moves
-    // any more, and nothing is solved.
+    // Whether the positions found keep the constraints, to half of the digits of what they are measured by, or to the
+    // rounding of their terms. Where constraints depend on one another, multipliers grow until corrections are lost in
+    // their rounding: nothing moves any more, and nothing is solved.
     bool keeps_constraints(const Arrays& a) const {
+        const real few = real(128) * Limits<real>::epsilon / Limits<real>::root_epsilon;
         for (int part = 0; part < parts; ++part) {
             V size[constraints];
-            for (int c = 0; c < constraints; ++c) size[c] = V(fabs(h)) * fabs(a.phi_t[part * constraints + c]);
+            for (int c = 0; c < constraints; ++c)
+                size[c] = V(fabs(h)) * fabs(a.phi_t[part * constraints + c]) + V(few * a.terms[c]);
             for (int e = 0; e < slopes; ++e)
                 size[K::constraint_row[e]] = fused(fabs(a.G[part * slopes + e]), V(a.measure[K::constraint_column[e]]),
                                                    size[K::constraint_row[e]]);

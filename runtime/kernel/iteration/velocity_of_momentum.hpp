@@ -180,9 +180,9 @@ private:
         return true;
     }
 
-    // Whether what is left is rounding: of the terms of p, where these cancel at rest, beside the momentum and what
-    // constraints take of it, which may be all, or beside the whole motion, in the metric of the mass: |p_i| <=
-    // sqrt(M_ii p v). The terms of one row may all be rounding, as those of a coordinate that a constraint holds fixed.
+    // Whether what is left is rounding. It is measured by the momentum, and what constraints take of it, which may be
+    // all; by the whole motion, in the metric of the mass: |p_i| <= sqrt(M_ii p v); and by the terms of p, where these
+    // cancel at rest. The terms of one row may all be rounding, as those of a coordinate that a constraint holds fixed.
     static bool is_rounding(const State& at, const Arrays& a) {
         real twice_energy = real(0), mass[n] = {}, size[unknowns] = {};
         for (int i = 0; i < n; ++i) twice_energy += fabs(at.p[i] * a.x[i]);

@@ -379,7 +379,7 @@ private:
                     if (K::event_direction[e] * direction >= 0) {
                         const int from = before >= 0 ? before : 0;
                         const bool is_exactly = zero >= 0 && samples[zero].value == real(0);
-                        bool is_root = i > 0 || is_small_at_start(last);
+                        bool is_root = i > 0 || is_wall(e) || is_small_at_start(last);
                         const real root = is_beyond    ? until
                                           : is_exactly ? samples[zero].theta
                                           : changes(samples[from].value, here.value)
