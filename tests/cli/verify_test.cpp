@@ -214,6 +214,9 @@ TEST_CASE("right kernels are not accused where the equations of a step are badly
              {"x'^2/2 + y'^2/2 - 50000*(x - y)^2 - x^4/4 - y^4/4",
               "x = { position = 1, velocity = 0 }\ny = { position = 1, velocity = 0 }", gauss_4, "0.5",
               "not decided  the equations of such a step lose 1 digits"},
+             // an error that the largest of the steps leave by chance
+             {"q'^2/2 + cos(q)", "q = { position = 2, velocity = 0 }", "points = 11", "0.1",
+              " where 20 is promised: the error of this motion shrinks faster"},
              // a motion whose acceleration has no bound
              {"q'^4/4 - q^2/2", "q = { position = 0.1, velocity = 0.1 }", "points = 4", "0.01",
               "not decided  0.52 where 6 is promised: the motion is not smooth enough to tell"},

@@ -113,9 +113,9 @@ private:
     TrajectoryRequest request_;
     std::vector<int> groups_;
     int rows_a_step_;
-    std::vector<Pulse> pulses_;  // which the steps of the run may miss: the companion's are fine there
-    NarrowTerms narrow_;         // likewise, where the motion meets them
-    ConstraintSizes constraints_;
+    std::vector<Pulse> pulses_;    // which the steps of the run may miss: the companion's are fine there
+    NarrowTerms narrow_;           // likewise, where the motion meets them
+    ConstraintSizes constraints_;  // what rounding in them moves positions by
     std::vector<double> parameters_;
     std::vector<double> knots_;  // of measured values in time, at which its steps end
     std::int64_t looked_ = 0;    // at terms, along steps of the companion
