@@ -178,9 +178,9 @@ std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double 
             judgement.rounding));
     if (judgement.radians > judgement.limit)
         texts.push_back(fmt::format(
-            "the step is beyond the linear stability limit: h omega = {:.3g} is more than {:.4g}, omega the largest "
+            "the step is beyond the linear stability limit: h omega = {:.4g} is more than {:.4g}, omega the largest "
             "frequency met. Take a step below {:.2g} times this one, or Gauss, which has no limit",
-            judgement.radians, judgement.limit, judgement.limit / judgement.radians));
+            judgement.radians, judgement.limit, part_below(judgement.limit, judgement.radians)));
     if (judgement.unresolved)
         texts.push_back(fmt::format(
             "in step {}, from t = {:.6g} on, the motion is not resolved: shorter steps lead to another place, or the "

@@ -39,4 +39,9 @@ double stability_limit(const Quadrature& quadrature, double up_to) {
     return none;
 }
 
+double part_below(double limit, double radians) {
+    const double part = limit / radians, unit = std::pow(10, std::floor(std::log10(part)) - 1);
+    return std::floor(part / unit) * unit;
+}
+
 }  // namespace lobatto

@@ -15,4 +15,7 @@ namespace lobatto {
 // (Sturm's theorem), while all intervals of 12 points take a quarter of a second. Of splitting methods by numbers.
 double stability_limit(const Quadrature& quadrature, double up_to = std::numeric_limits<double>::infinity());
 
+// A part of a step of this h omega that is below the limit, to two digits.
+double part_below(double limit, double radians);
+
 }  // namespace lobatto

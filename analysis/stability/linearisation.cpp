@@ -290,14 +290,28 @@ bool Linearisation::rests(const Position& q) {
     return std::all_of(f.begin(), f.end(), [](const Sized& component) { return component.vanishes(); });
 }
 
+// Far out a force such as 1 - tanh(x)^2 is a rounding of its terms, and has no slope that could be told from rounding.
+bool Linearisation::fades(const Position& q) {
+    const LinearSystem::Entries stiffness = at_rest(q).stiffness;
+    const std::vector<Sized> f = force(q);
+    for (std::size_t k = 0; k < f.size(); ++k) {
+        const bool has_slope = std::any_of(stiffness.begin(), stiffness.end(),
+                                           [&](const auto& entry) { return entry.first.first == static_cast<int>(k); });
+        if (!has_slope && cln::abs(f[k].value) > f[k].size * cln::expt(cln::cl_RA(10), -54)) return true;
+    }
+    return false;
+}
+
 std::vector<Eigen::Index> Linearisation::angles(const Position& q) {
-    const auto is_angle = [&](const Position& from, std::size_t k) {
+    const auto is_angle = [&](const Position& from, std::size_t k, bool may_rest) {
         Position turned = from;
         turned[k] = turned[k] + 2 * cln::pi(cln::float_format(number_digits));
         try {
             const std::vector<Sized> here = force(from), there = force(turned);
-            return std::equal(here.begin(), here.end(), there.begin(),
-                              [](const Sized& a, const Sized& b) { return a.equals(b); });
+            const bool is_pulled =
+                std::any_of(here.begin(), here.end(), [](const Sized& a) { return !cln::zerop(a.value); });
+            return (may_rest || is_pulled) && std::equal(here.begin(), here.end(), there.begin(),
+                                                         [](const Sized& a, const Sized& b) { return a.equals(b); });
         } catch (const DomainError&) {
             return false;
         }
@@ -307,7 +321,7 @@ std::vector<Eigen::Index> Linearisation::angles(const Position& q) {
     for (std::size_t k = 0; k < q.size(); ++k) beside[k] = beside[k] + exactly(0.1 / (1.0 + static_cast<double>(k)));
     std::vector<Eigen::Index> result;
     for (std::size_t k = 0; k < q.size(); ++k)
-        if (is_angle(q, k) && is_angle(beside, k)) result.push_back(static_cast<Eigen::Index>(k));
+        if (is_angle(q, k, true) && is_angle(beside, k, false)) result.push_back(static_cast<Eigen::Index>(k));
     return result;
 }
 
@@ -363,8 +377,8 @@ std::optional<Linearisation::Position> Linearisation::equilibrium_from(const Vec
         Position rounded = q;
         for (std::size_t k = 0; k < q.size(); ++k)
             if (std::fabs(cln::double_approx(q[k])) <= 1e-12 * extent(static_cast<Eigen::Index>(k))) rounded[k] = 0;
-        if (rests(rounded)) return rounded;
-        if (rests(q)) return q;
+        for (const Position& place : {rounded, q})
+            if (rests(place) && !fades(place)) return place;
     } catch (const DomainError&) {
     }
     return std::nullopt;

@@ -67,9 +67,10 @@ public:
         const Numbers in_forces = rounding_in_forces();
         for (std::size_t i = 0; i < motion && i < left.size(); ++i)
             rounding[group(i)] = cln::max(rounding[group(i)], in_forces[i % n_]);
+        const cln::cl_R underflow = cln::expt(cln::cl_RA(10), -300);
         cln::cl_R worst = 0;
         for (std::size_t i = 0; i < left.size(); ++i)
-            if (!cln::zerop(left[i]) && !cln::zerop(rounding[group(i)]))
+            if (cln::abs(left[i]) > underflow && !cln::zerop(rounding[group(i)]))
                 worst = cln::max(worst, cln::abs(left[i]) / rounding[group(i)]);
         return cln::double_approx(worst);
     }

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "generator/describe/describe.hpp"
 #include "generator/formula/text/source.hpp"
@@ -80,8 +82,8 @@ std::string latex_equation(const std::string& left, const std::string& right) {
     return display(body + "\n\\end{aligned}");
 }
 
-std::string latex_matrix(const Formula& formula, const std::vector<std::string>& entries) {
-    std::string body = latex_name(formula.left[0]) + " = \\begin{bmatrix}\n";
+std::string latex_matrix(const Formula& formula, const std::string& left, const std::vector<std::string>& entries) {
+    std::string body = left + " = \\begin{bmatrix}\n";
     for (std::size_t i = 0; i < entries.size(); ++i) {
         const bool last = (i + 1) % formula.shape[1] == 0;
         body += entries[i] + (!last ? " & " : i + 1 < entries.size() ? " \\\\[0.6ex]\n" : "\n");
@@ -89,9 +91,43 @@ std::string latex_matrix(const Formula& formula, const std::vector<std::string>&
     return display(body + "\\end{bmatrix}");
 }
 
+// The names of a description in LaTeX, all different.
+class DistinctNames {
+public:
+    explicit DistinctNames(const Description& description) {
+        std::map<std::string, GiNaC::symbol> symbols;
+        std::set<std::string> names;
+        for (const Section& section : description.sections)
+            for (const Formula& formula : section.formulas) {
+                names.insert(formula.left.begin(), formula.left.end());
+                for (const GiNaC::ex& value : formula.values)
+                    for (auto part = value.preorder_begin(); part != value.preorder_end(); ++part)
+                        if (GiNaC::is_a<GiNaC::symbol>(*part)) {
+                            const auto& symbol = GiNaC::ex_to<GiNaC::symbol>(*part);
+                            symbols.emplace(symbol.get_name(), symbol);
+                            names.insert(symbol.get_name());
+                        }
+            }
+        as_written_ = latex_as_written(names);
+        for (const auto& [name, latex] : as_written_)
+            if (const auto found = symbols.find(name); found != symbols.end())
+                display_[found->second] = GiNaC::symbol(latex);
+    }
+    std::string of(const std::string& name) const {
+        const auto found = as_written_.find(name);
+        return latex_name(found == as_written_.end() ? name : found->second);
+    }
+    GiNaC::ex in(const GiNaC::ex& value) const { return value.subs(display_, GiNaC::subs_options::no_pattern); }
+
+private:
+    std::map<std::string, std::string> as_written_;
+    GiNaC::exmap display_;
+};
+
 }  // namespace
 
 std::string latex_of(const Description& description) {
+    const DistinctNames names(description);
     std::size_t widest = 10;
     for (const Section& section : description.sections)
         for (const Formula& formula : section.formulas)
@@ -108,12 +144,13 @@ std::string latex_of(const Description& description) {
             text += fmt::format("\n\\medskip({}) {}{}\n", formula.number, escaped(formula.meaning),
                                 formula.paper.empty() ? "" : " [paper: " + escaped(formula.paper) + "]");
             std::vector<std::string> values;
-            for (const GiNaC::ex& value : formula.values) values.push_back(canonical_text(value, Notation::latex));
+            for (const GiNaC::ex& value : formula.values)
+                values.push_back(canonical_text(names.in(value), Notation::latex));
             if (formula.shape.size() == 2)
-                text += latex_matrix(formula, values);
+                text += latex_matrix(formula, names.of(formula.left[0]), values);
             else
                 for (std::size_t i = 0; i < values.size(); ++i)
-                    text += latex_equation(latex_name(formula.left[i]), values[i]);
+                    text += latex_equation(names.of(formula.left[i]), values[i]);
         }
     }
     text += "\n\\section*{Structure}\n\\begin{description}\n";

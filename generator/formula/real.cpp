@@ -2,6 +2,7 @@
 // Every operation runs at the working digits and passes through `checked`.
 #include "generator/formula/real.hpp"
 
+#include <cln/float.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,6 +21,8 @@ using GiNaC::is_a;
 using GiNaC::numeric;
 
 std::atomic<int> digits{60};
+// exp(-728) becomes 0 where it becomes a double, as in every other program; CLN would throw.
+[[maybe_unused]] const bool underflows_to_zero = cln::cl_inhibit_floating_point_underflow = true;
 // |value| <= 2^4096, about 1e1233; beyond it sin() would need millions of digits of pi.
 constexpr int largest_magnitude = 4096;
 

@@ -2,7 +2,10 @@
 // Names of scenes as LaTeX: Greek letters, subscripts, dots of velocities.
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
+#include <tuple>
+#include <vector>
 
 #include "generator/graph/notation.hpp"
 
@@ -18,18 +21,17 @@ std::string latex_name(const std::string& name) {
             names.emplace(letter, std::string("\\") + letter);
         return names;
     }();
+    if (!name.empty() && name.front() == '\\') return name;
     std::string stem = name, subscript;
     const bool velocity = !stem.empty() && stem.back() == '\'';
     if (velocity) stem.pop_back();
     if (const auto underscore = stem.find('_'); underscore != std::string::npos && underscore > 0) {
         subscript = stem.substr(underscore + 1);
         stem.erase(underscore);
-    } else {
-        std::size_t digits = stem.find_last_not_of("0123456789") + 1;
-        if (digits > 0) {
-            subscript = stem.substr(digits);
-            stem.erase(digits);
-        }
+    }
+    if (const std::size_t digits = stem.find_last_not_of("0123456789") + 1; digits > 0 && digits < stem.size()) {
+        subscript = stem.substr(digits) + (subscript.empty() ? "" : "_" + subscript);
+        stem.erase(digits);
     }
     if (const auto letter = greek.find(stem); letter != greek.end())
         stem = letter->second;
@@ -51,6 +53,28 @@ std::string latex_name(const std::string& name) {
     }
     if (!below.empty()) stem += "_{" + below + "}";
     return stem;
+}
+
+std::map<std::string, std::string> latex_as_written(const std::set<std::string>& names) {
+    std::map<std::string, std::vector<std::string>> alike;
+    for (const std::string& name : names) alike[latex_name(name)].push_back(name);
+    std::map<std::string, std::string> written;
+    for (const auto& [latex, group] : alike) {
+        const auto clarity = [](const std::string& name) {
+            return std::make_tuple(name.back() == '_', name.find('_') == std::string::npos, name.size());
+        };
+        const auto clearest = std::min_element(group.begin(), group.end(),
+                                               [&](const auto& a, const auto& b) { return clarity(a) < clarity(b); });
+        for (const std::string& name : group) {
+            if (name == *clearest) continue;
+            std::string letters;
+            for (const char c : name)
+                if (c != '\'') letters += c == '_' ? std::string("\\_") : std::string(1, c);
+            const std::string upright = "\\mathrm{" + letters + "}";
+            written[name] = name.back() == '\'' ? "\\dot{" + upright + "}" : upright;
+        }
+    }
+    return written;
 }
 
 }  // namespace lobatto

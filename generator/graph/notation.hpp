@@ -3,6 +3,8 @@
 #pragma once
 
 #include <functional>
+#include <map>
+#include <set>
 #include <string>
 
 #include "generator/graph/graph.hpp"
@@ -31,7 +33,10 @@ std::string canonical_text(const GiNaC::ex& expression, Notation notation = Nota
 // For messages: of a long one only how long it is.
 std::string short_text(const GiNaC::ex& expression);
 
-// A name for LaTeX: theta_1' becomes \dot{\theta}_{1}.
+// A name for LaTeX: theta_1' becomes \dot{\theta}_{1}. One that begins with a backslash is LaTeX already.
 std::string latex_name(const std::string& name);
+// x1 and x_1 are both x_{1}: of names of one document that LaTeX would write alike, all but the clearest one, each with
+// LaTeX that spells it out, \mathrm{x1}.
+std::map<std::string, std::string> latex_as_written(const std::set<std::string>& names);
 
 }  // namespace lobatto

@@ -26,6 +26,7 @@ constexpr int finest_ratio = 8;    // the reference against the smallest step of
 constexpr int most_attempts = 14;  // ladders, each half of the one before, or three or four times it below rounding
 constexpr double roundings = 64;   // of a step, all the same way; measured: 5 on the linear oscillator
 constexpr double least_error = 1e-29;
+constexpr double flat_order = 0.1, flat_error = 1e-20;  // errors that do not depend on the step are rounding, if small
 
 Quadruple size(Quadruple x) {
     return x < 0 ? -x : x;
@@ -140,6 +141,10 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
         measured.order = measured.rows.back().order;
         const double change = std::fabs(measured.order - measured.rows[count - 2].order);
         measured.settled = change < std::fmax(0.1, measured.order / 30);
+        const auto is_flat = [](const ConvergenceRow& row) {
+            return row.error < flat_error && std::fabs(row.order) < flat_order;
+        };
+        measured.exact = std::all_of(measured.rows.begin(), measured.rows.end(), is_flat);
         if (best.rows.empty() || change < least_change) best = measured;
         least_change = std::fmin(least_change, change);
         coarse /= 2;

@@ -30,10 +30,26 @@ struct Equations {
     }
 };
 
+double product(const std::vector<double>& x, const std::vector<double>& y) {
+    double sum = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) sum += x[i] * y[i];
+    return sum;
+}
+
 double norm(const std::vector<double>& x) {
-    double square = 0;
-    for (const double value : x) square += value * value;
-    return std::sqrt(square);
+    return std::sqrt(product(x, x));
+}
+
+// The larger |lambda| of lambda^2 = a lambda + b, which A has where A x = first u and A u = second w; x, u and w of
+// length 1. With friction lambda is a complex pair, and the lengths of powers of A swing about it.
+double largest_eigenvalue(const std::vector<double>& x, const std::vector<double>& u, const std::vector<double>& w,
+                          double first, double second) {
+    constexpr double parallel = 1e-9;
+    const double xu = product(x, u), xw = product(x, w), uw = product(u, w), apart = 1 - xu * xu;
+    if (!(apart > parallel)) return second;
+    const double a = second * (uw - xu * xw) / apart, b = first * second * (xw - xu * uw) / apart;
+    const double discriminant = a * a + 4 * b;
+    return discriminant < 0 ? std::sqrt(-b) : (std::fabs(a) + std::sqrt(discriminant)) / 2;
 }
 
 }  // namespace
@@ -73,9 +89,9 @@ double largest_frequency(const LoadedStepper<real>& stepper, real time, const st
         for (double& value : Ax) value /= first;
         if (!derivative(Ax, AAx)) return std::nan("");
         const double second = norm(AAx);
-        growth = std::sqrt(first * second);
         if (!(second > 0)) return 0;
         for (double& value : AAx) value /= second;
+        growth = largest_eigenvalue(x, Ax, AAx, first, second);
         x = AAx;
     }
     return growth;

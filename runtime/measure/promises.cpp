@@ -361,7 +361,7 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
     result.drift = std::fabs(mean[1] - mean[0]);
     // Rounding of the energy itself, and of the steps: a periodic motion repeats it, so that it adds up.
     result.rounding = rounding_of<double>() * energy_size * (8 + static_cast<double>(result.steps) / 4);
-    result.bounded = reach[1] <= 4 * reach[0];
+    result.bounded = reach[1] <= 3 * reach[0];  // four times: a fall
     // The same run from a start disturbed by 1e-12 of the region: how far it is from this one in the last tenth.
     constexpr double disturbance = 1e-12, most_growth = 1e7;
     const double region = std::max(reach[0], reach[1]);

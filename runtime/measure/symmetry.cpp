@@ -221,7 +221,10 @@ MomentumVariation momentum_variation(const Kernel& kernel, const Symmetry& symme
                                      const std::vector<double>& parameters, const std::vector<double>& q,
                                      const std::vector<double>& p, double step, std::int64_t steps) {
     const std::size_t n = q.size();
-    double least = 0, most = 0, size = 0;
+    LoadedStepper<double> slopes(kernel);
+    if (slopes.prepare(parameters, step) != LOBATTO_OK)
+        throw ComputationError("momenta cannot be followed: the kernel refuses the scene's values");
+    double least = 0, most = 0, size = 0, changed = 0;
     bool first = true;
     TrajectoryRequest request;
     request.parameters = parameters;
@@ -231,26 +234,30 @@ MomentumVariation momentum_variation(const Kernel& kernel, const Symmetry& symme
     request.steps = steps;
     request.sink = [&](const Records& records) {
         for (std::int64_t i = 0; i < records.count; ++i) {
-            const double* const position = records.rows + i * records.columns + 1;
-            double value = 0, sizes = 0;
+            const double* const row = records.rows + i * records.columns;
+            const std::vector<double> position(row + 1, row + 1 + n), momentum(row + 1 + n, row + 1 + 2 * n);
+            std::vector<double> v, Lv, Lq;
+            const bool has_slopes = slopes.velocity(row[0], position, momentum, v) == LOBATTO_OK;
+            if (has_slopes) slopes.slopes(row[0], position, v, Lv, Lq);
+            double value = 0, sizes = 0, rate = 0;
+            const auto add = [&](std::size_t k, double coefficient, double x, double x_rate) {
+                value += coefficient * momentum[k] * x;
+                sizes += std::fabs(coefficient * momentum[k] * x);
+                if (has_slopes) rate += coefficient * (Lq[k] * x + Lv[k] * x_rate);
+            };
             for (std::size_t k = 0; k < n; ++k) {
-                const double* const momentum = position + n;
-                value += momentum[k] * symmetry.d[k];
-                sizes += std::fabs(momentum[k] * symmetry.d[k]);
-                for (std::size_t l = 0; l < n; ++l) {
-                    const double term = momentum[k] * symmetry.B[k * n + l] * position[l];
-                    value += term;
-                    sizes += std::fabs(term);
-                }
+                add(k, symmetry.d[k], 1, 0);
+                for (std::size_t l = 0; l < n; ++l) add(k, symmetry.B[k * n + l], position[l], has_slopes ? v[l] : 0);
             }
             least = first ? value : std::fmin(least, value);
             most = first ? value : std::fmax(most, value);
             size = std::fmax(size, sizes);
+            changed += std::fabs(step * rate);
             first = false;
         }
     };
     const TrajectoryResult run = integrate(kernel, request);
-    return {run.steps_done, size > 0 ? (most - least) / size : 0.0};
+    return {run.steps_done, size > 0 ? (most - least) / size : 0.0, size > 0 ? changed / size : 0.0};
 }
 
 }  // namespace lobatto

@@ -25,10 +25,12 @@ struct Symmetry {
 std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<double>& parameters,
                                       const std::vector<double>& q, double step, const std::vector<std::string>& names);
 
-// How much p . (B q + d) varies over the steps of a run, relative to the largest sum of the sizes of its terms.
+// How much p . (B q + d) varies over the steps of a run, and how much the slopes at their ends say that the motion
+// changes it, h sum |(B q + d) . (dL/dq + F) + (B v) . dL/dv|: what the samples took for a symmetry may be none where
+// the motion comes to. Relative to the largest sum of the sizes of its terms.
 struct MomentumVariation {
     std::int64_t steps = 0;  // good steps, at most those asked for
-    double variation = 0;
+    double variation = 0, by_motion = 0;
 };
 MomentumVariation momentum_variation(const Kernel& kernel, const Symmetry& symmetry,
                                      const std::vector<double>& parameters, const std::vector<double>& q,

@@ -417,7 +417,7 @@ TEST_CASE("run warns beyond the linear stability limit") {
     const Place place;
     const test::Finished ran =
         place.run({"run", pendulum, "--points", "2", "--step", "0.4", "--until", "4", "-o", place.folder / "run.csv"});
-    CHECK(test::contains(ran.err, "beyond the linear stability limit: h omega = 2.51 is more than 2"));
+    CHECK(test::contains(ran.err, "beyond the linear stability limit: h omega = 2.513 is more than 2"));
     CHECK(
         place.run({"run", pendulum, "--points", "2", "--step", "0.01", "--until", "4", "-o", place.folder / "run.csv"})
             .err == "");

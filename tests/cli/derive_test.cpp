@@ -124,6 +124,20 @@ TEST_CASE("--json lists every formula with its shape, in a fixed order of keys")
     CHECK(document["formulas"][4]["value"][0] == std::vector<std::string>{"7/3", "-8/3", "1/3"});  // K, Simpson
 }
 
+TEST_CASE("--latex writes two names of one document differently: x1 beside the node x_1, x_2 beside x_2_") {
+    const std::string wells = latex_of(description_of(
+        scene_with("x'^2/2 - (x - x1)^2*(x - x_2)^2", "x = { position = 1, velocity = 0 }\n", "x1 = 1\nx_2 = 2\n")));
+    CHECK(test::contains(wells, "V = {\\left(\\mathrm{x1} - x\\right)}^{2} \\, {\\left(x - x_{2}\\right)}^{2}"));
+    CHECK(test::contains(wells, "\\mathrm{x\\_2\\_} - x_{2}"));  // at the second node
+    CHECK(test::contains(wells, "\\mathrm{x1} - x_{1}"));
+    const std::string numbered = latex_of(
+        description_of(scene_with("x12'^2/2 + x3'^2/2 - cos(x12 - x3)",
+                                  "x12 = { position = 1, velocity = 0 }\nx3 = { position = 1, velocity = 0 }\n", "")));
+    CHECK(test::contains(numbered, "\\cos\\left(x_{12} - x_{3}\\right)"));
+    CHECK(test::contains(numbered, "\\cos\\left(x_{12,1} - x_{3,1}\\right)"));
+    CHECK(!test::contains(numbered, "mathrm{x"));
+}
+
 TEST_CASE("--latex is a whole document in which nothing of the scene is markup") {
     Derivation derivation = derive(read_scene(tree + "/scenes/pendulum.toml"));
     derivation.scene.title = "50 % of $x_1 & \\input{secret} {#} ~ ^ \xCE\xA9";

@@ -199,6 +199,20 @@ TEST_CASE("what the linear part, the limit or a measurement cannot tell is said"
     CHECK(test::contains(parametric.out, "steps examined); as forces change with time it may grow all the same\n"));
 }
 
+TEST_CASE("a force that fades far out is no equilibrium, and a length no angle") {
+    const test::TemporaryFolder folder;
+    const test::Finished valley =
+        stability({scene_in(folder, "(x'^2 + y'^2)/2 - tanh(30*x)^2 - y^2",
+                            "x = { position = 0.1, velocity = 0 }\ny = { position = 0.02, velocity = 0 }")});
+    CHECK(test::contains(valley.out, "About the equilibrium x = 0, y = 0"));
+    CHECK(!test::contains(valley.out, "free: moves on"));
+    const test::Finished tweezers =
+        stability({scene_in(folder, "1e-15*(x'^2 + z'^2)/2 + 1e-18*exp(-2*x^2/1e-12)/(1 + (z/3e-6)^2)",
+                            "x = { position = 1e-7, velocity = 0 }\nz = { position = 2e-7, velocity = 0 }")});
+    CHECK(test::contains(tweezers.out, "About the equilibrium x = 0, z = 0"));
+    CHECK(!test::contains(tweezers.out, "3.14159"));
+}
+
 TEST_CASE("frequencies are met along a motion whose velocities couple the coordinates, and their absence is said") {
     const test::TemporaryFolder folder;
     // In a turning frame: two springs of frequency 10, seen at 9 and 11.

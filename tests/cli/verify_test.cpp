@@ -187,6 +187,37 @@ TEST_CASE("correct code passes at rest, far from zero and near it, and where ene
     }
 }
 
+TEST_CASE("right kernels are not accused where forces are hidden at the start, fade, or are a constant in disguise") {
+    const TemporaryFolder folder;
+    struct Motion {
+        const char *lagrangian, *coordinates, *says;
+    };
+    for (const Motion& motion : std::vector<Motion>{
+             // a wall ahead: at the samples near the start nothing depends on x
+             {"x'^2/2 - 2*exp(-((x - 5)/0.1)^2)", "x = { position = 4, velocity = 1 }", "symmetries  none found"},
+             // a force on y below all numbers of double
+             {"x'^2/2 + y'^2/2 - 2*exp(-((x - y - 50)/0.5)^2) - x^2/200",
+              "x = { position = 0, velocity = 10 }\ny = { position = 0, velocity = 0 }", "one trajectory, double"},
+             // free fall with a total derivative
+             {"x'^2/2 - 9.81*x + x^2*x'", "x = { position = 1, velocity = 0.3 }",
+              "10.00 where 6 is promised: the error of this motion shrinks faster"},
+             // three masses on springs that fall together
+             {"(x'^2 + y'^2 + z'^2)/2 - (x - y)^2 - (y - z)^2*5 + x + y + z",
+              "x = { position = 0.3, velocity = 1 }\ny = { position = 0.7, velocity = 0.2 }\nz = { position = 0.1, "
+              "velocity = 0.4 }",
+              "motion unbounded"}}) {
+        write_text(folder / "scene.toml", std::string("lagrangian = \"") + motion.lagrangian + "\"\n[coordinates]\n" +
+                                              motion.coordinates + "\n[run]\nstep = 0.05\nuntil = 1\n");
+        const Finished result = verify({(folder / "scene.toml").string()});
+        std::string out = result.out;  // columns are as wide as their longest entry
+        for (std::size_t at; (at = out.find("   ")) != std::string::npos;) out.erase(at, 1);
+        INFO(motion.lagrangian << "\n" << result.out << result.err);
+        CHECK(result.exit_code == 0);
+        CHECK(!contains(result.out, "FAILED"));
+        CHECK(contains(out, motion.says));
+    }
+}
+
 TEST_CASE("right kernels are not accused where the equations of a step are badly conditioned, or nothing can be told" *
           doctest::test_suite("slowest")) {
     const TemporaryFolder folder;

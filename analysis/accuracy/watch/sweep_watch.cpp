@@ -83,12 +83,12 @@ std::string SweepWatch::warning() const {
     const double limit = radians_ > 0 ? stability_limit(outline_.quadrature, radians_) : radians_;
     if (!(radians_ > limit)) return "";
     return fmt::format(
-        "the step is beyond the linear stability limit, at most in trajectory {}: h omega = {:.3g} is more than "
+        "the step is beyond the linear stability limit, at most in trajectory {}: h omega = {:.4g} is more than "
         "{:.4g}, "
         "omega the largest frequency at starts and ends. Take a step below {:.2g} times this one, or Gauss, which has "
         "no "
         "limit",
-        trajectory_, radians_, limit, limit / radians_);
+        trajectory_, radians_, limit, part_below(limit, radians_));
 }
 
 bool SweepWatch::run_again(const EnsembleTrajectory& trajectory) {

@@ -31,8 +31,11 @@ bool has_scaled_mass(const Scene& scene, const System& system) {
             if (!is_scaled) return;
             Formulas formulas;
             point.set_all(formulas);
-            for (const Sized& value : formulas.evaluate_sized(formulas.convert(differences)))
-                is_scaled = is_scaled && value.vanishes();
+            const std::vector<Id> roots = formulas.convert(differences);
+            const std::vector<Sized> nodes = formulas.evaluate_all_sized(roots);
+            const std::vector<GiNaC::exset> hidden = formulas.hidden(roots, nodes);
+            for (std::size_t i = 0; i < roots.size(); ++i)
+                is_scaled = is_scaled && hidden[i].empty() && nodes[static_cast<std::size_t>(roots[i])].vanishes();
         });
     } catch (const DomainError&) {
         return false;

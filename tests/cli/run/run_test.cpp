@@ -513,6 +513,30 @@ TEST_CASE("a motion where rest is impossible has an energy") {
     CHECK(last[1] * last[1] + last[2] * last[2] == doctest::Approx(13).epsilon(1e-9));
 }
 
+TEST_CASE("a potential that is below all numbers of double at the start runs") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene,
+                     "lagrangian = \"x'^2/2 - exp(-x^2)\"\n[coordinates]\nx = { position = -27, velocity = 2 }\n"
+                     "[run]\nstep = 0.01\nuntil = 1\n");
+    const test::Finished finished = place.run({scene, "-o", place.file()});
+    CHECK(finished.err == "");
+    CHECK(finished.exit_code == 0);
+    CHECK(test::read_trajectory(place.file()).rows.back()[1] == doctest::Approx(-25).epsilon(1e-14));
+}
+
+TEST_CASE("the stability limit with friction is that of the frequency, and the advised part of a step is below it") {
+    const Place place;
+    const std::string scene = place.file("scene.toml");
+    test::write_text(scene,
+                     "lagrangian = \"x'^2/2 - 100*x^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+                     "[forces]\nx = \"-0.1*x'\"\n[run]\nstep = 0.3\nuntil = 3\n");
+    const auto said = [&](const char* h) { return place.run({scene, "--step", h, "-o", place.file()}).err; };
+    CHECK(!test::contains(said("0.311"), "beyond the linear stability limit"));
+    CHECK(test::contains(said("0.4472"), "h omega = 4.472 is more than 3.113"));
+    CHECK(test::contains(said("0.4472"), "Take a step below 0.69 times this one"));
+}
+
 TEST_CASE("the stability limit is the same in any unit of mass") {
     const Place place;
     const std::string scene = place.file("scene.toml");

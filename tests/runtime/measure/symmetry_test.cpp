@@ -35,10 +35,11 @@ TEST_CASE("two masses that feel only their distance move together: p_x + p_y is 
     REQUIRE(found.size() == 1);
     CHECK(found[0].kind == "translation");
     CHECK(found[0].momentum == "p_x + p_y");
-    const auto [steps, change] = variation(kernel, found[0]);
+    const auto [steps, change, by_motion] = variation(kernel, found[0]);
     CHECK(steps == 1000);
     CHECK(change > 0);
     CHECK(change < 1e-13);  // measured 2e-15
+    CHECK(by_motion < 1e-13);
 }
 
 TEST_CASE("a central force turns in the plane: x*p_y - y*p_x is conserved") {
@@ -92,6 +93,19 @@ TEST_CASE("a weak force beside a strong one is no symmetry, however small the un
     const auto found = symmetries(planar("(1000000*x - y)^4"));
     REQUIRE(found.size() == 1);
     CHECK(found[0].momentum == "p_x + 1e+06*p_y");
+}
+
+TEST_CASE("where the motion leaves the region of the samples, its own slopes tell what is no symmetry") {
+    const Kernel wall = planar("2*exp(-((x - 5)/0.1)^2)");
+    Symmetry along_x;
+    along_x.B.assign(4, 0.0);
+    along_x.d = {1, 0};
+    const MomentumVariation thrown = momentum_variation(wall, along_x, {}, {1, 0.5}, {1, 1}, 0.01, 1000);
+    CHECK(thrown.variation > 1);
+    CHECK(thrown.by_motion > 0.5 * thrown.variation);
+    const MomentumVariation kept = variation(planar("cos(y)"), along_x);
+    CHECK(kept.variation == 0);
+    CHECK(kept.by_motion == 0);
 }
 
 TEST_CASE("what is no symmetry is not conserved") {
