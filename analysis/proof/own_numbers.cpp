@@ -65,10 +65,6 @@ double distance(const State& x, std::size_t parts_of_x, const State& y, std::siz
     return std::fmax(distance(x.q, parts_of_x, y.q, parts_of_y), distance(x.p, parts_of_x, y.p, parts_of_y));
 }
 
-ProofRow within(const std::string& claim, double measured, double bound, const std::string& meaning) {
-    return {claim, fmt::format("{:.2g}", measured), fmt::format("{:.2g}", bound), measured <= bound, meaning};
-}
-
 }  // namespace
 
 std::vector<ProofRow> prove_numbers(Precision numbers, const Kernel& kernel, const Kernel& quadruple,
@@ -91,18 +87,18 @@ std::vector<ProofRow> prove_numbers(Precision numbers, const Kernel& kernel, con
     const std::string against = fmt::format("{} steps against quadruple, {}", steps_there, name),
                       back = fmt::format("{} steps and back, {}", steps_there, name);
     if (!take_steps(own, there) || !take_steps(reference, exact) || !take_steps(reference, disturbed)) {
-        rows.push_back({against, "not decided", "a step fails on the way", true, ""});
+        rows.push_back(not_decided(against, "a step fails on the way"));
         return rows;
     }
     const double growth = std::fmax(1, distance(disturbed, reference.parts(), exact, reference.parts()) / disturbance);
     if (!(growth < most_growth)) {
-        rows.push_back({against, "not decided", "rounding grows too fast for even 20 steps", true, ""});
+        rows.push_back(not_decided(against, "rounding grows too fast for even 20 steps"));
         return rows;
     }
     const double of_steps = roundings * steps_there * growth;
-    rows.push_back(within(against, distance(there, own.parts(), exact, reference.parts()),
-                          of_steps * (kernel->epsilon + quadruple->epsilon),
-                          "the kernel in " + name + " does not take the steps that the one in quadruple takes"));
+    rows.push_back(at_most(against, distance(there, own.parts(), exact, reference.parts()),
+                           of_steps * (kernel->epsilon + quadruple->epsilon),
+                           "the kernel in " + name + " does not take the steps that the one in quadruple takes"));
     if (kernel->has_energy != 0 && quadruple->has_energy != 0) {
         Parts H(own.parts()), exact_H(reference.parts());
         const bool has_both = own.energy(begin.time.data(), begin.q.data(), begin.p.data(), H.data()) == LOBATTO_OK &&
@@ -110,24 +106,24 @@ std::vector<ProofRow> prove_numbers(Precision numbers, const Kernel& kernel, con
                                                exact_H.data()) == LOBATTO_OK;
         const std::string claim = "H at the start, " + name + " against quadruple";
         if (has_both)
-            rows.push_back(within(claim, distance(H, own.parts(), exact_H, reference.parts()),
-                                  of_energy * (kernel->epsilon + quadruple->epsilon),
-                                  "terms of the energy cancel and take its digits with them"));
+            rows.push_back(at_most(claim, distance(H, own.parts(), exact_H, reference.parts()),
+                                   of_energy * (kernel->epsilon + quadruple->epsilon),
+                                   "terms of the energy cancel and take its digits with them"));
     }
     State home = there;
     prepare(own, -step);
     if (take_steps(own, home))
-        rows.push_back(within(back, distance(begin, own.parts(), home, own.parts()), 2 * of_steps * kernel->epsilon,
-                              "the step is not its own inverse with -h"));
+        rows.push_back(at_most(back, distance(begin, own.parts(), home, own.parts()), 2 * of_steps * kernel->epsilon,
+                               "the step is not its own inverse with -h"));
     else
-        rows.push_back({back, "not decided", "a step fails on the way", true, ""});
+        rows.push_back(not_decided(back, "a step fails on the way"));
     if (!is_symplectic || kernel->has_tangent == 0) return rows;
     prepare(own, step);
     double defect = 0;
     for (const State* state : {&begin, static_cast<const State*>(&there)})
         defect = std::fmax(defect, symplectic_defect(own, state->q, state->p));
-    rows.push_back(within("symplectic defect, " + name, defect, of_tangent_map * kernel->epsilon,
-                          "the step does not preserve phase-space areas"));
+    rows.push_back(at_most("symplectic defect, " + name, defect, of_tangent_map * kernel->epsilon,
+                           "the step does not preserve phase-space areas"));
     return rows;
 }
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "analysis/exact_start.hpp"
-#include "analysis/proof/proof.hpp"
+#include "analysis/proof/proof_row.hpp"
 #include "runtime/build/library.hpp"
 
 namespace lobatto {

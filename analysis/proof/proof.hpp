@@ -7,16 +7,10 @@
 #include <vector>
 
 #include "analysis/method_choice.hpp"
+#include "analysis/proof/proof_row.hpp"
 #include "runtime/measure/convergence.hpp"
 
 namespace lobatto {
-
-// A claim, what was measured of it, and what is allowed.
-struct ProofRow {
-    std::string claim, measured, bound;
-    bool holds = false;
-    std::string meaning;  // of a failure
-};
 
 struct Proof {
     std::string title, method;
