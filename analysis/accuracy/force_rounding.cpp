@@ -80,7 +80,13 @@ double force_rounding(const Outline& outline, const LoadedStepper<double>& stepp
     double worst = 0;
     for (std::size_t k = 0; k < n; ++k) {
         if (!moves[k]) continue;
-        double largest = 0;
+        // All of them together change no momentum beyond its own rounding.
+        double latest = 0, momentum = 0, largest = 0;
+        for (const std::vector<double>& row : rows) {
+            latest = std::fmax(latest, std::fabs(row[0]));
+            momentum = std::fmax(momentum, std::fabs(row[1 + n + k]));
+        }
+        if (errors[k] * latest <= 0x1p-53 * momentum) continue;
         for (const std::vector<cln::cl_R>& force : forces)
             largest = std::fmax(largest, std::fabs(cln::double_approx(force[k])));
         if (largest > 0) worst = std::fmax(worst, errors[k] / largest);

@@ -66,7 +66,7 @@ private:
     LinearSystem at_rest(const Position& q) { return at(0, q, Position(q.size(), cln::cl_R(0))); }
     std::vector<Sized> force(const Position& q);  // at rest: dL/dq + F, n
     bool rests(const Position& q);
-    bool fades(const Position& q);  // a force is there, and too weak to have a slope
+    bool fades(const Position& q);                        // a force is there, and too weak to have a slope
     std::vector<Eigen::Index> angles(const Position& q);  // coordinates of which a whole turn changes no force
     Eigen::VectorXd newton_step(const Position& q, const Eigen::VectorXd& force);
     // `is_multiple`: several equilibria meet there, so that its last digits are not known.

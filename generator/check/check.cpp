@@ -62,13 +62,14 @@ Check differences(const Derivation& derivation, const std::string& claim, const 
         Numbers start;
         for (const auto& unknown : unknowns) start.push_back(formulas.get(unknown));
         const Numbers direction = seeded_direction(start, noise);
+        const std::vector<Sized> sizes = formulas.evaluate_sized(roots);
         const auto difference = [&](const cln::cl_R& e) {
             return central_difference(start, direction, e, [&](const Numbers& x) {
                 for (std::size_t j = 0; j < unknowns.size(); ++j) formulas.set(unknowns[j], x[j]);
                 return formulas.evaluate(roots);
             });
         };
-        check.measured = std::max(check.measured, difference_defect(times(values, direction), difference));
+        check.measured = std::max(check.measured, difference_defect(times(values, direction), difference, sizes));
     });
     check.holds = check.measured <= check.bound;
     return check;

@@ -67,18 +67,28 @@ Numbers central_difference(const Numbers& start, const Numbers& direction, const
 
 // The relative difference of derivatives and their central differences, difference(e): with e = 1e-20, or with the e
 // that suits them better where positions are so large that truncation, or so small that rounding is in the way.
+// `sizes` of the functions, if given, tell where their rounding hides all that they change by: DomainError if it always
+// does.
 template <class Difference>
-double difference_defect(const Numbers& derivatives, const Difference& difference) {
+double difference_defect(const Numbers& derivatives, const Difference& difference,
+                         const std::vector<Sized>& sizes = {}) {
+    cln::cl_R rounding = 0, most = 0;  // of the functions at 57 digits; of the derivatives
+    for (const Sized& size : sizes) rounding = cln::max(rounding, size.size * cln::expt(cln::cl_RA(10), -57));
+    for (const cln::cl_R& derivative : derivatives) most = cln::max(most, cln::abs(derivative));
     double least = HUGE_VAL;
+    bool is_hidden = !derivatives.empty();
     for (const int digits : {20, 26, 32, 14, 8, 2}) {
         try {
             const cln::cl_R e = cln::cl_float(cln::expt(cln::cl_RA(10), -digits), cln::float_format(number_digits));
+            if (!cln::zerop(most) && rounding > e * most) continue;
+            is_hidden = false;
             least = std::fmin(least, relative_difference(derivatives, difference(e)));
         } catch (const DomainError&) {
             if (least == HUGE_VAL) throw;
         }
         if (least <= difference_bound) break;
     }
+    if (is_hidden) throw DomainError("the derivatives are below the rounding of what they belong to");
     return least;
 }
 
