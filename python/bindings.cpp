@@ -7,9 +7,11 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <lobatto/lobatto.hpp>
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
@@ -244,6 +246,12 @@ void add_errors(py::module_& module) {
 
 void add_scene(py::module_& module) {
     py::class_<lob::Variable>(module, "Variable", "A coordinate or a parameter.")
+        .def(py::pickle(
+            [](const lob::Variable& variable) { return py::make_tuple(variable.name, variable.unit, variable.value); },
+            [](const py::tuple& state) {
+                return lob::Variable{state[0].cast<std::string>(), state[1].cast<std::string>(),
+                                     state[2].cast<double>()};
+            }))
         .def_readonly("name", &lob::Variable::name)
         .def_readonly("unit", &lob::Variable::unit)
         .def_readonly("value", &lob::Variable::value, "A coordinate's initial position; a parameter's value.")
@@ -260,7 +268,12 @@ void add_scene(py::module_& module) {
     using Scenes = py::class_<lob::Scene, std::unique_ptr<lob::Scene, Freed>>;
     const py::call_guard<py::gil_scoped_release> without_lock;
     Scenes(module, "Scene", "A mechanical system, read from a scene file and checked.")
-        .def(py::init<const std::string&>(), py::arg("path"), without_lock)
+        .def(py::init([](const std::filesystem::path& path) { return lob::Scene(path.string()); }), py::arg("path"),
+             without_lock)
+        .def(py::pickle([](const lob::Scene& scene) { return py::make_tuple(scene.text(), scene.path()); },
+                        [](const py::tuple& state) {
+                            return lob::Scene::from_text(state[0].cast<std::string>(), state[1].cast<std::string>());
+                        }))
         .def_static("from_text", &lob::Scene::from_text, py::arg("text"), py::arg("path") = "scene.toml", without_lock,
                     "The text of a scene file; `path` stands in errors.")
         .def_property_readonly("path", &lob::Scene::path)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Types of the compiled module. Settings: points, stages, splitting, tolerance, arithmetic, numbers, clock, step, until, every, set."""
 
+import os
 from typing import Any, Callable, Optional
 
 import numpy
@@ -35,7 +36,7 @@ class Scene:
     step: float
     until: float
     starts_with_momenta: bool
-    def __init__(self, path: str) -> None: ...
+    def __init__(self, path: str | os.PathLike[str]) -> None: ...
     @staticmethod
     def from_text(text: str, path: str = ...) -> Scene: ...
     def emit(self, **settings: Any) -> tuple[str, str]: ...

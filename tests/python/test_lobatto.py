@@ -2,8 +2,10 @@
 """The Python module: one trajectory, many, choosing, errors, what it costs."""
 
 import fractions
+import multiprocessing
 import os
 import pathlib
+import pickle
 import signal
 import subprocess
 import sys
@@ -44,6 +46,18 @@ def test_a_lagrangian_written_in_python_is_the_scene_of_the_same_text(pendulum):
         lobatto.Lagrangian("q'^2/2")
     with pytest.raises(lobatto.InputError, match="unknown name 'k'"):
         lobatto.Lagrangian("q'^2/2 - k*q", q=1)
+
+
+def test_scenes_and_runs_go_to_other_processes(pendulum):
+    assert lobatto.Scene(SCENES / "pendulum.toml").text == pendulum.text  # a pathlib.Path
+    again = pickle.loads(pickle.dumps(pendulum))
+    assert again.text == pendulum.text and again.path == pendulum.path
+    run = lobatto.run(pendulum, until=2)
+    other = pickle.loads(pickle.dumps(run))
+    assert numpy.array_equal(other.q, run.q) and other.error == run.error
+    assert numpy.array_equal(other(1.234).q, run(1.234).q)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert numpy.array_equal(pool.apply(lobatto.run, (pendulum,), {"until": 2}).q, run.q)
 
 
 def test_a_companion_in_finer_numbers_measures_rounding(pendulum):
