@@ -44,7 +44,7 @@ double norm(const std::vector<double>& x) {
 // length 1. With friction lambda is a complex pair, and the lengths of powers of A swing about it.
 double largest_eigenvalue(const std::vector<double>& x, const std::vector<double>& u, const std::vector<double>& w,
                           double first, double second) {
-    constexpr double parallel = 1e-9;
+    constexpr double parallel = 1e-6;
     const double xu = product(x, u), xw = product(x, w), uw = product(u, w), apart = 1 - xu * xu;
     if (!(apart > parallel)) return second;
     const double a = second * (uw - xu * xw) / apart, b = first * second * (xw - xu * uw) / apart;
