@@ -36,10 +36,18 @@ int complain(const api::Error& error) {
     return error.exit_code();
 }
 
-// What was printed must have arrived: a full disk behind `> file` is an error, although every write was only buffered.
-void flush_output() {
-    if (!std::cout.flush() || std::fflush(stdout) != 0)
-        throw MachineError(fmt::format("cannot write to standard output: {}. Is the disk full?", std::strerror(errno)));
+// What was printed must have arrived: a full disk behind `> file` is an error, whether a write was buffered or not.
+void run_to_the_last_byte(CommandLine& program, int argc, char** argv) {
+    const auto refused = [](int why) {
+        throw MachineError(fmt::format("cannot write to standard output: {}. Is the disk full?", std::strerror(why)));
+    };
+    try {
+        program.run(argc, argv);
+    } catch (const std::system_error& error) {
+        if (std::ferror(stdout) == 0) throw;
+        refused(error.code().value());
+    }
+    if (!std::cout.flush() || std::fflush(stdout) != 0) refused(errno);
 }
 
 void describe(CommandLine& program) {
@@ -94,8 +102,7 @@ int main(int argc, char** argv) {
         "Lobatto is a compiler for mechanics: it turns a Lagrangian into a symplectic integrator in C++.", "lobatto");
     try {
         describe(program);
-        api::guarded([&] { program.run(argc, argv); });
-        api::guarded(flush_output);
+        api::guarded([&] { run_to_the_last_byte(program, argc, argv); });
         return 0;
     } catch (const ExitCode& end) {
         return end.code;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "analysis/accuracy/formulas/stopped_at_formula.hpp"
+#include "analysis/accuracy/watch/energy_watch.hpp"
 #include "analysis/kernel/derived_kernel.hpp"
 #include "generator/mechanics/start.hpp"
 #include "library/parts.hpp"
@@ -70,9 +71,9 @@ Kernel compile(const Scene& scene, const Settings& settings) {
                 "{}: steps that a caller takes are computed in double, but numbers are \"{}\"; leave them out, or use "
                 "run(), which computes in all numbers",
                 changed.path, precision_name(changed.method.numbers)));
-        changed.outputs.energy = true;
         const Overrides overrides = overrides_of(settings);
-        const DerivedKernel derived = derived_kernel(changed, {}, nullptr, with_values(changed, overrides));
+        const DerivedKernel derived = derived_kernel(changed, {Precision::double_, false, EnergyWatch::can_watch},
+                                                     nullptr, with_values(changed, overrides));
         apply(overrides, changed);
         if (!overrides.set.empty()) check_values(changed);
         const Steps steps = steps_of(changed, overrides);

@@ -11,6 +11,9 @@
 
 #include <lobatto/lobatto.hpp>
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -82,6 +85,27 @@ auto unlocked(const Work& work) {
         if (PyErr_Occurred() != nullptr) throw py::error_already_set();
         throw;
     }
+}
+
+// In parts of about a twentieth of a second, between which Ctrl-C is heard; the motion stays where it was then.
+bool advance(lob::Stepper& stepper, std::int64_t steps) {
+    using Clock = std::chrono::steady_clock;
+    bool goes_on = true;
+    for (std::int64_t block = 256; goes_on && steps > block;) {
+        const Clock::time_point start = Clock::now();
+        goes_on = unlocked([&] { return stepper.advance(block); });
+        const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+        steps -= block;
+        block = std::max<std::int64_t>(
+            static_cast<std::int64_t>(static_cast<double>(block) * std::min(0.05 / seconds, 8.0)), 1);
+    }
+    return goes_on && unlocked([&] { return stepper.advance(steps); });
+}
+bool advance_to(lob::Stepper& stepper, double t) {
+    const double steps = std::floor((t - stepper.t()) / (stepper.next_time() - stepper.t())) - 1;
+    if (steps >= 1 && steps < 9e15 && !advance(stepper, static_cast<std::int64_t>(steps))) return false;
+    return unlocked([&] { return stepper.advance_to(t); });
 }
 
 // What the last holder of a scene destroys are formulas, too.
@@ -315,9 +339,8 @@ void add_stepper(py::module_& module) {
              }),
              py::arg("scene"))
         .def("step", &lob::Stepper::step, "One step. False where a stop of the scene ended the motion.")
-        .def("advance", &lob::Stepper::advance, py::arg("steps"), py::call_guard<py::gil_scoped_release>(),
-             "So many steps. False where a stop ended the motion.")
-        .def("advance_to", &lob::Stepper::advance_to, py::arg("t"), py::call_guard<py::gil_scoped_release>(),
+        .def("advance", &advance, py::arg("steps"), "So many steps. False where a stop ended the motion.")
+        .def("advance_to", &advance_to, py::arg("t"),
              "Equal steps while they fit, then a shorter one that ends at t exactly.")
         .def(
             "start",

@@ -72,6 +72,7 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
         if table:
             lines.append(f"[{heading}]")
             lines += [f"{name} = {_value(value)}" for name, value in table.items()]
+    inputs = list(inputs)
     for name in inputs:
         if name in moving or name not in variables:
             raise InputError(f"'{name}' is to be an input; give its value: Lagrangian(..., {name}=0, "

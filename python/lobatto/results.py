@@ -44,15 +44,16 @@ class _Rows:
         return None
 
     def __getitem__(self, name):
-        if name in ("t", "H") and self._index(name) is None:
+        found = self._index(name) if isinstance(name, str) else None
+        if found is not None:
+            return found[0][:, found[1]]
+        own = [column for column in ("t", "H", "energy_error") if getattr(self, column, None) is not None]
+        if isinstance(name, str) and name in own:
             return getattr(self, name)
-        found = self._index(name)
-        if found is None:
-            names = [variable.name for variable in self.coordinates]
-            beside = "".join(f", {other}" for other in getattr(self, "column_names", []))
-            raise KeyError(
-                f"there is no column '{name}'; there are t, {', '.join(names)}, p_{', p_'.join(names)}{beside}")
-        return found[0][:, found[1]]
+        names = self.names
+        beside = [*getattr(self, "column_names", []), *getattr(self, "kept", [])]
+        raise KeyError(f"there is no column {name!r}; there are "
+                       f"{', '.join([*own, *names, *('p_' + name for name in names), *beside])}")
 
     @property
     def names(self):

@@ -8,7 +8,7 @@ import warnings
 import numpy
 
 from . import _lobatto
-from ._lobatto import RunFailure, Scene, Stepper
+from ._lobatto import InputError, RunFailure, Scene, Stepper
 from .results import Choice, Claims, Derivation, Sweep, Trajectory, _states_at
 
 
@@ -36,18 +36,30 @@ def run(scene, *, measure=True, companion="", beyond_horizon=False, progress=Non
     return Trajectory(scene, settings, values)
 
 
+def _columns(starts):
+    """Arrays of one length."""
+    for name, values in starts.items():
+        if numpy.ma.is_masked(values):
+            raise InputError(f"starts: {name} has masked values; leave these trajectories out (.compressed())")
+    arrays = [numpy.asarray(values, dtype=float) for values in starts.values()]
+    try:
+        shape = numpy.broadcast_shapes(*(array.shape for array in arrays))
+    except ValueError:
+        shapes = ", ".join(f"{name} has {array.shape}" for name, array in zip(starts, arrays))
+        raise InputError(f"starts: these shapes do not go together: {shapes}") from None
+    return {name: numpy.broadcast_to(array, shape).ravel() for name, array in zip(starts, arrays)}
+
+
 def sweep(scene, starts, *, keep=(), threads=0, measure=True, beyond_horizon=False, progress=None, **settings):
     """Runs a scene from many starts at once. Returns a Sweep.
 
-    ``starts``: arrays by name, of one length or one number for all: positions "q", velocities "q'" or momenta "p_q",
-    parameters. ``keep``: formulas such as "first(b = pi)", "max(H)", in place of the last states. ``every``: keep each
+    ``starts``: numbers or arrays by name: positions "q", velocities "q'" or momenta "p_q", parameters. Arrays are
+    broadcast as NumPy does it, then flattened in C order: a sparse grid of 3 x 1 and 1 x 4 makes 12 trajectories. ``keep``: formulas such as "first(b = pi)", "max(H)", in place of the last states. ``every``: keep each
     such state of all trajectories too; ``states(i)`` of the Sweep returns them. ``measure``: errors by companions, which
     take 3/2 of the sweep's time. ``beyond_horizon``: trajectories of which nothing is left are no failures.
     """
-    columns = numpy.broadcast_arrays(*(numpy.atleast_1d(numpy.asarray(values, dtype=float)).ravel()
-                                       for values in starts.values()))
-    columns = dict(zip(starts, (numpy.ascontiguousarray(column) for column in columns)))
     scene = _scene(scene)
+    columns = _columns(starts)
     values = _lobatto.sweep(scene, columns, list(keep), threads, measure, beyond_horizon, progress, **settings)
     for warning in values["warnings"]:
         warnings.warn(warning, stacklevel=2)
@@ -109,20 +121,20 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
     scene = _scene(scene)
     begin, end = (float(time) for time in t_span)
     if begin != 0 or end < 0:
-        raise _lobatto.InputError(f"t_span: a scene begins at t = 0 and goes on to later times, not from {begin:g} to "
+        raise InputError(f"t_span: a scene begins at t = 0 and goes on to later times, not from {begin:g} to "
                                   f"{end:g}")
     if "until" in settings:
-        raise _lobatto.InputError("until: the end stands in t_span")
+        raise InputError("until: the end stands in t_span")
     if t_eval is not None:
         t_eval = numpy.asarray(t_eval, dtype=float)
         if t_eval.ndim != 1 or not ((begin <= t_eval) & (t_eval <= end)).all() or (numpy.diff(t_eval) < 0).any():
-            raise _lobatto.InputError(f"t_eval needs ascending times from {begin:g} to {end:g}")
+            raise InputError(f"t_eval needs ascending times from {begin:g} to {end:g}")
     stepper = Stepper(scene, until=end, **settings)
     n = len(stepper.q)
     if y0 is not None:
         y0 = numpy.asarray(y0, dtype=float)
         if y0.shape != (2 * n,):
-            raise _lobatto.InputError(f"y0 needs {2 * n} numbers: {n} positions, then {n} velocities")
+            raise InputError(f"y0 needs {2 * n} numbers: {n} positions, then {n} velocities")
         stepper.start(0.0, y0[:n], velocity=y0[n:])
     times, q, p, velocities, status, message = [0.0], [stepper.q.copy()], [stepper.p.copy()], [stepper.velocity], 0, ""
     try:

@@ -264,6 +264,25 @@ TEST_CASE("values that are set later must keep what those of the scene do") {
     CHECK(failed("top.toml", "A=0.1,-1,0.36").find("2 of 3 trajectories failed: 2 not finite.") != std::string::npos);
 }
 
+TEST_CASE("a state that rounding leaves behind a wall may be a start, one that is behind it may not") {
+    // Three equal balls, the middle one at rest but for rounding. Two units: the coordinates differ by 1e6, the metric
+    // of the kinetic energy makes them equal.
+    const auto balls = [](const std::string& first, const std::string& second) {
+        return fmt::format(
+            "lagrangian = \"(x'^2 + y'^2*1e12)/2 - x^2/2 - y^2*1e12/2\"\n[coordinates]\n"
+            "x = {{ position = {}, velocity = 0 }}\ny = {{ position = {}, velocity = 0 }}\n"
+            "[impacts]\nwall = {{ when = \"y = 0 falling\" }}\n{}",
+            first, second, method("points = 4", 0.05, 3));
+    };
+    const Ended ended = run(balls("1", "-1e-21"));
+    CHECK(ended.result.status == LOBATTO_OK);
+    CHECK(std::fabs(ended.result.q[0] - std::cos(3.0)) < 1e-5);
+    CHECK(std::fabs(ended.result.q[1]) < 1e-20);
+    // As far behind it as rounding of x would be if both were of one unit.
+    CHECK_THROWS_WITH(run(balls("1", "-1e-16")), doctest::Contains("or is behind a wall"));
+    CHECK(refusal(balls("1", "-1e-12")).find("behind the wall wall") != std::string::npos);
+}
+
 TEST_CASE("impacts that accumulate end the run, with the state before that step") {
     // The heights fall by e^2, so that all ends at sqrt(2/g) (1 + e) / (1 - e) = 3.
     for (const double e : {0.5, 0.0}) {

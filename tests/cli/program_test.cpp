@@ -198,5 +198,5 @@ TEST_CASE("a full disk behind the standard output is exit code 4") {
     const test::TemporaryFolder folder;
     const Answer much = shell(program + " paper --no-figures -o '" + folder.string() + "' > /dev/full");
     CHECK(much.code == 4);
-    CHECK(much.text == "lobatto: cannot write to file: No space left on device\n");
+    CHECK(much.text == "lobatto: cannot write to standard output: No space left on device. Is the disk full?\n");
 }

@@ -121,6 +121,23 @@ def test_states_between_with_a_clock():
     assert numpy.max(numpy.abs(run(fine.t).q - fine.q)) < 1e-8
 
 
+def test_states_between_where_bodies_rest_at_walls():
+    run = lobatto.run(str(SCENES / "newtons_cradle.toml"), measure=False)
+    assert numpy.array_equal(run(run.t).q, run.q)
+    between = run(numpy.linspace(0, run.t[-1], 1001)).q
+    assert (numpy.diff(between) > -1e-12).all()  # no ball is inside another
+
+
+def test_a_stepper_takes_the_steps_of_a_run():
+    for name, until in ("kapitza_pendulum", 0.05), ("newtons_cradle", 2), ("wing_nut", 2):
+        scene = lobatto.Scene(SCENES / f"{name}.toml")
+        run, stepper = lobatto.run(scene, measure=False, until=until), lobatto.Stepper(scene, until=until)
+        assert numpy.isnan(stepper.H) == (run.H is None)
+        for q, p in zip(run.q, run.p):
+            assert numpy.array_equal(stepper.q, q) and numpy.array_equal(stepper.p, p)
+            stepper.step()
+
+
 def test_an_exception_of_the_caller_ends_the_work_and_arrives(pendulum):
     class Enough(Exception):
         pass
@@ -206,6 +223,23 @@ def test_a_sweep_takes_and_gives_arrays(pendulum):
     assert kept.error.max() < 1e-3
     with pytest.raises(lobatto.InputError, match="unknown column 'quux'"):
         lobatto.sweep(pendulum, {"quux": starts})
+    with pytest.raises(KeyError, match=r"no column 'H'; there are t, energy_error, q, p_q, max\(q\)"):
+        kept["H"]
+    with pytest.raises(KeyError, match="no column 0"):
+        run[0]
+
+
+def test_a_sweep_broadcasts_as_numpy_does(pendulum):
+    angles, rates = numpy.meshgrid([0.5, 1, 1.5], [4.0, 6], indexing="ij", sparse=True)
+    grid = lobatto.sweep(pendulum, {"q": angles, "omega": rates, "m": 1}, until=1)
+    assert numpy.array_equal(grid["q"].reshape(3, 2),
+                             [[lobatto.sweep(pendulum, {"q": q, "omega": omega}, until=1)["q"][0] for omega in (4.0, 6)]
+                              for q in (0.5, 1, 1.5)])
+    with pytest.raises(lobatto.InputError, match=r"do not go together: q has \(2,\), omega has \(3,\)"):
+        lobatto.sweep(pendulum, {"q": [1, 2], "omega": [1, 2, 3]})
+    with pytest.raises(lobatto.InputError, match="q has masked values"):
+        lobatto.sweep(pendulum, {"q": numpy.ma.masked_less([0.5, 1], 0.7)})
+
 
 
 def test_a_sweep_keeps_states_on_the_way(pendulum):
@@ -283,6 +317,22 @@ def test_ctrl_c_ends_a_long_run(pendulum):
     threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
         lobatto.run(pendulum, until=1e9, every=10**6, measure=False)
+
+
+def test_ctrl_c_ends_long_steps(pendulum):
+    for goes_on in lambda stepper: stepper.advance(10**12), lambda stepper: stepper.advance_to(1e9):
+        stepper = lobatto.Stepper(pendulum)
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            goes_on(stepper)
+        assert stepper.t > 0 and stepper.step()
+    parts, whole = lobatto.Stepper(pendulum), lobatto.Stepper(pendulum)
+    parts.advance_to(3000.01)
+    for _ in range(60000):
+        whole.step()
+    assert numpy.array_equal(parts.at(whole.t)[0], whole.q)
+    whole.advance_to(3000.01)
+    assert numpy.array_equal(parts.q, whole.q)
 
 
 def test_other_threads_run_meanwhile(pendulum):

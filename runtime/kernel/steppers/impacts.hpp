@@ -55,30 +55,42 @@ struct Walls {
     static real side(S& stepper, int w) {
         return w < impacts ? real(-K::event_direction[first + w]) : stepper.side(w - impacts);
     }
-    bool is_behind(int w) const { return value[first + w] * real(-K::event_direction[first + w]) < -slack[w]; }
+    bool is_behind() const {  // of impacts
+        for (int w = 0; w < impacts; ++w)
+            if (value[first + w] * real(-K::event_direction[first + w]) < -slack[w]) return true;
+        return false;
+    }
     bool is_met(int w) const { return fabs(value[first + w]) <= slack[w] && approach[w] < real(0); }
 
     // (D52) What wall w does to the momentum.
     Status hit(S& stepper, int w) {
         if (K::reset_of[w] >= 0) return reset(stepper, K::reset_of[w]);
-        const real* const G = gradient + w * n;
-        real still[n] = {}, rest[n], pushed[n], without[n], with[n];
-        stepper.momentum(time, q, still, rest);
-        for (int c = 0; c < n; ++c) pushed[c] = rest[c] + G[c];
-        Status status = stepper.velocity(time, q, rest, without);
-        if (status == Status::ok) status = stepper.velocity(time, q, pushed, with);
+        real change[n], mobility;
+        const Status status = push(stepper, w, change, mobility);
         if (status != Status::ok) return status;
-        real mobility = real(0);
-        for (int c = 0; c < n; ++c) mobility += G[c] * (with[c] - without[c]);
         const real impulse = -(real(1) + restitution[w]) * approach[w] * side(stepper, w) / mobility;
         if (!is_finite(impulse)) return Status::not_finite;
-        if constexpr (constraints_of<K>() > 0) {
-            for (int c = 0; c < n; ++c) velocity[c] += impulse * (with[c] - without[c]);
-            stepper.momentum(time, q, velocity, p);
-        } else {
-            for (int c = 0; c < n; ++c) p[c] += impulse * G[c];
+        for (int c = 0; c < n; ++c) {
+            velocity[c] += impulse * change[c];
+            p[c] += impulse * gradient[w * n + c];
         }
+        if constexpr (constraints_of<K>() > 0) stepper.momentum(time, q, velocity, p);
         return look(stepper, time, q, p);
+    }
+
+    // What a rounding of the largest coordinate does to each g, over epsilon. The metric of the kinetic energy makes
+    // one unit of all: g grows by sqrt(dq M dq) sqrt(dg/dq M^-1 dg/dq) at most.
+    void scale_by_whole_motion(S& stepper) {
+        const real h = stepper.step_size;
+        real still[n] = {}, rest[n], moved[n], size = real(0), change[n], mobility;
+        stepper.momentum(time, q, still, rest);
+        stepper.momentum(time, q, q, moved);
+        for (int c = 0; c < n; ++c) size += q[c] * (moved[c] - rest[c]) + h * h * velocity[c] * (p[c] - rest[c]);
+        for (int w = 0; w < impacts; ++w) {
+            if (push(stepper, w, change, mobility) != Status::ok) continue;
+            const real scale = sqrt(size * mobility);
+            if (scale > stepper.wall_scale[w] && is_finite(scale)) stepper.wall_scale[w] = scale;
+        }
     }
 
     // Positions and velocities as the scene gives them.
@@ -94,6 +106,21 @@ struct Walls {
     }
 
 private:
+    // An impulse of dg/dq on the motion at rest: the velocity that it gives, and dg/dt.
+    Status push(S& stepper, int w, real* change, real& mobility) {
+        real still[n] = {}, rest[n], pushed[n], without[n];
+        stepper.momentum(time, q, still, rest);
+        for (int c = 0; c < n; ++c) pushed[c] = rest[c] + gradient[w * n + c];
+        Status status = stepper.velocity(time, q, rest, without);
+        if (status == Status::ok) status = stepper.velocity(time, q, pushed, change);
+        mobility = real(0);
+        for (int c = 0; c < n; ++c) {
+            change[c] -= without[c];
+            mobility += gradient[w * n + c] * change[c];
+        }
+        return status;
+    }
+
     void look_at_impacts(S& stepper) {
         Formulas<K>::impact(stepper.coefficients, time, q, gradient, rate, restitution);
         for (int w = 0; w < impacts; ++w) {
@@ -141,9 +168,12 @@ struct Sides {
         for (real& scale : stepper.wall_scale) scale = real(0);
         for (real& size : stepper.scaled_at) size = real(0);
         if constexpr (switches_of<K>() > 0) scale_switches(stepper, time, q, p);
-        const Status status = wall.look(stepper, time, q, p);
-        for (int w = 0; w < impacts_of<K>() && status == Status::ok; ++w)
-            if (wall.is_behind(w)) return Status::off_constraints;
+        Status status = wall.look(stepper, time, q, p);
+        if (status == Status::ok && wall.is_behind()) {
+            wall.scale_by_whole_motion(stepper);
+            status = wall.look(stepper, time, q, p);
+            if (status == Status::ok && wall.is_behind()) return Status::off_constraints;
+        }
         return status;
     }
     // sum |du/dx x| over the time, positions and velocities: what a rounding of these does to a switch u, over epsilon.
