@@ -15,6 +15,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -102,9 +103,16 @@ bool advance(lob::Stepper& stepper, std::int64_t steps) {
     }
     return goes_on && unlocked([&] { return stepper.advance(steps); });
 }
+// A step, or with a clock the way to the next of the scene's times, tells how long the others are.
 bool advance_to(lob::Stepper& stepper, double t) {
-    const double steps = std::floor((t - stepper.t()) / (stepper.next_time() - stepper.t())) - 1;
-    if (steps >= 1 && steps < 9e15 && !advance(stepper, static_cast<std::int64_t>(steps))) return false;
+    constexpr double few = 256;
+    if (t - stepper.t() > few * (stepper.next_time() - stepper.t())) {
+        if (!unlocked([&] { return stepper.advance(1); })) return false;
+        const double now = stepper.t(), length = stepper.next_time() - now;
+        const double rounding = 4 * std::numeric_limits<double>::epsilon() * std::fmax(std::fabs(t), 1) / length;
+        const double steps = std::floor((t - now) / length * (1 - rounding)) - 2;
+        if (steps > few && steps < 9e15 && !advance(stepper, static_cast<std::int64_t>(steps))) return false;
+    }
     return unlocked([&] { return stepper.advance_to(t); });
 }
 
@@ -296,7 +304,8 @@ void add_scene(py::module_& module) {
              without_lock)
         .def(py::pickle([](const lob::Scene& scene) { return py::make_tuple(scene.text(), scene.path()); },
                         [](const py::tuple& state) {
-                            return lob::Scene::from_text(state[0].cast<std::string>(), state[1].cast<std::string>());
+                            const auto text = state[0].cast<std::string>(), path = state[1].cast<std::string>();
+                            return unlocked([&] { return lob::Scene::from_text(text, path); });
                         }))
         .def_static("from_text", &lob::Scene::from_text, py::arg("text"), py::arg("path") = "scene.toml", without_lock,
                     "The text of a scene file; `path` stands in errors.")

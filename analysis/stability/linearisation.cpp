@@ -378,7 +378,7 @@ std::optional<Linearisation::Position> Linearisation::equilibrium_from(const Vec
         for (std::size_t k = 0; k < q.size(); ++k)
             if (std::fabs(cln::double_approx(q[k])) <= 1e-12 * extent(static_cast<Eigen::Index>(k))) rounded[k] = 0;
         for (const Position& place : {rounded, q})
-            if (rests(place) && !fades(place)) return place;
+            if (rests(place) && (is_multiple || !fades(place))) return place;
     } catch (const DomainError&) {
     }
     return std::nullopt;

@@ -41,12 +41,13 @@ double norm(const std::vector<double>& x) {
 }
 
 // The larger |lambda| of lambda^2 = a lambda + b, which A has where A x = first u and A u = second w; x, u and w of
-// length 1. With friction lambda is a complex pair, and the lengths of powers of A swing about it.
+// length 1. With friction lambda is a complex pair, and the lengths of powers of A swing about it: little where x and u
+// are parallel all the same, because the units of positions and momenta are far apart.
 double largest_eigenvalue(const std::vector<double>& x, const std::vector<double>& u, const std::vector<double>& w,
                           double first, double second) {
     constexpr double parallel = 1e-6;
     const double xu = product(x, u), xw = product(x, w), uw = product(u, w), apart = 1 - xu * xu;
-    if (!(apart > parallel)) return second;
+    if (!(apart > parallel)) return std::sqrt(first * second);
     const double a = second * (uw - xu * xw) / apart, b = first * second * (xw - xu * uw) / apart;
     const double discriminant = a * a + 4 * b;
     return discriminant < 0 ? std::sqrt(-b) : (std::fabs(a) + std::sqrt(discriminant)) / 2;

@@ -135,6 +135,28 @@ TEST_CASE("numbers of steps meet the samples of a reference often") {
     }
 }
 
+TEST_CASE("the frequency of two stiff masses with friction is found in any units of positions and momenta") {
+    const Place place;
+    const Kernel kernel = kernel_of(
+        emit(derive(read_scene(Source("stiff.toml",
+                                      "lagrangian = \"(x'^2 + y'^2)/2 - k*x^2/2 - k*(x - y)^2/2\"\n[parameters]\n"
+                                      "k = 1\nc = 0\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+                                      "y = { position = 0, velocity = 0 }\n"
+                                      "[forces]\nx = \"-c*x'\"\ny = \"-c*y'\"\n[run]\nstep = 0.1\nuntil = 1\n")))),
+        Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    const double golden = (1 + std::sqrt(5.0)) / 2;  // the frequencies are sqrt(k) times this and 1 over it
+    for (const double k : {1.0, 1e4, 1e6, 1e8, 1e12}) {
+        CAPTURE(k);
+        const double omega = golden * std::sqrt(k);
+        REQUIRE(stepper.prepare({k, 0.005 * omega}, 0.1 / omega) == LOBATTO_OK);
+        CHECK(largest_frequency<double>(stepper, 0, {1, 0}, {0, 0}, {1, 1, 1, 1}) ==
+              doctest::Approx(omega).epsilon(0.02));
+        CHECK(largest_frequency<double>(stepper, 0, {1, 0}, {0, 0}, {1, 1, omega, omega}) ==
+              doctest::Approx(omega).epsilon(1e-4));
+    }
+}
+
 TEST_CASE("explicit extrapolation follows the pendulum to 1e-15, and its frequency at rest is that of small swings") {
     const Place place;
     Scene scene = read_scene(pendulum);

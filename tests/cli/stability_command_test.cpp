@@ -211,6 +211,10 @@ TEST_CASE("a force that fades far out is no equilibrium, and a length no angle")
                             "x = { position = 1e-7, velocity = 0 }\nz = { position = 2e-7, velocity = 0 }")});
     CHECK(test::contains(tweezers.out, "About the equilibrium x = 0, z = 0"));
     CHECK(!test::contains(tweezers.out, "3.14159"));
+    // But a multiple root is one, also where it is no double.
+    const test::Finished flat =
+        stability({scene_in(folder, "x'^2/2 - (x - 1/3)^4", "x = { position = 0.5, velocity = 0 }")});
+    CHECK(test::contains(flat.out, "About the equilibrium x = 0.333333"));
 }
 
 TEST_CASE("frequencies are met along a motion whose velocities couple the coordinates, and their absence is said") {

@@ -333,6 +333,16 @@ def test_ctrl_c_ends_long_steps(pendulum):
     assert numpy.array_equal(parts.at(whole.t)[0], whole.q)
     whole.advance_to(3000.01)
     assert numpy.array_equal(parts.q, whole.q)
+    far = lobatto.Stepper(pendulum, step=1e-4)  # whose times are rounded to a millionth of a step
+    far.start(1e6, [0.3], [0.5])
+    assert far.advance_to(1e6 + 100) and far.t == 1e6 + 100
+    clocked = lobatto.Stepper(comet(0.5), until=400)
+    assert clocked.advance_to(0.4999) and clocked.advance_to(333.3) and clocked.t == 333.3
+    whole = lobatto.Stepper(comet(0.5), until=400)
+    for _ in range(666):
+        whole.step()
+    whole.advance_to(333.3)
+    assert numpy.array_equal(clocked.q, whole.q)
 
 
 def test_other_threads_run_meanwhile(pendulum):
@@ -423,13 +433,14 @@ def test_examples(name, wanted, tmp_path):
 
 
 def test_a_thread_that_tunes_does_not_hold_up_those_that_read_scenes():
-    code = ("import lobatto, threading\n"
+    code = ("import lobatto, pickle, threading\n"
             "scene = lobatto.Scene(%r)\n"
             "tuning = threading.Thread(target=lobatto.tune, args=(scene, 1e-8), kwargs=dict(until=20, budget=3))\n"
             "tuning.start()\n"
             "while tuning.is_alive():\n"
             "    other = lobatto.Scene(%r)\n"
             "    other.emit()\n"
+            "    pickle.loads(pickle.dumps(other))\n"
             "    del other\n"
             "tuning.join()\n"
             "print('done')\n") % ((str(SCENES / "pendulum.toml"),) * 2)
