@@ -383,7 +383,9 @@ void add_stepper(py::module_& module) {
         .def_property_readonly("q", [vector](const py::object& self) { return vector(self, &lob::Stepper::q); })
         .def_property_readonly("p", [vector](const py::object& self) { return vector(self, &lob::Stepper::p); })
         .def_property_readonly("velocity", [](const lob::Stepper& stepper) { return owned(stepper.velocity()); })
-        .def_property_readonly("H", &lob::Stepper::energy, "The energy; not a number where the scene has none.")
+        .def_property_readonly(
+            "H", &lob::Stepper::energy,
+            "The energy; not a number where the scene leaves it out and the motion does not conserve it.")
         .def_property_readonly("multipliers", [](const lob::Stepper& stepper) { return owned(stepper.multipliers()); })
         .def_property_readonly("step_size", &lob::Stepper::step_size)
         .def(

@@ -290,14 +290,19 @@ bool Linearisation::rests(const Position& q) {
     return std::all_of(f.begin(), f.end(), [](const Sized& component) { return component.vanishes(); });
 }
 
-// Far out a force such as 1 - tanh(x)^2 is a rounding of its terms, and has no slope that could be told from rounding.
+// Far out a force such as 1 - tanh(x)^2 is a rounding of its terms, or 0, and has no slope that could be told from
+// rounding.
 bool Linearisation::fades(const Position& q) {
     const LinearSystem::Entries stiffness = at_rest(q).stiffness;
     const std::vector<Sized> f = force(q);
+    const std::vector<GiNaC::exset> hidden = formulas_.hidden(force_, formulas_.evaluate_all_sized(force_));
     for (std::size_t k = 0; k < f.size(); ++k) {
         const bool has_slope = std::any_of(stiffness.begin(), stiffness.end(),
                                            [&](const auto& entry) { return entry.first.first == static_cast<int>(k); });
-        if (!has_slope && cln::abs(f[k].value) > f[k].size * cln::expt(cln::cl_RA(10), -54)) return true;
+        const bool hides_position = std::any_of(system_.q.begin(), system_.q.end(),
+                                                [&](const GiNaC::symbol& x) { return hidden[k].contains(x); });
+        if (!has_slope && (hides_position || cln::abs(f[k].value) > f[k].size * cln::expt(cln::cl_RA(10), -54)))
+            return true;
     }
     return false;
 }

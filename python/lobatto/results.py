@@ -84,6 +84,9 @@ class Trajectory(_Rows):
         self._stepper = None
         self.__dict__.update(values)
 
+    def __getstate__(self):
+        return {**self.__dict__, "_stepper": None}
+
     def _index(self, name):
         if name in self.column_names:
             return self.columns, self.column_names.index(name)

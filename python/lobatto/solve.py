@@ -54,9 +54,10 @@ def sweep(scene, starts, *, keep=(), threads=0, measure=True, beyond_horizon=Fal
     """Runs a scene from many starts at once. Returns a Sweep.
 
     ``starts``: numbers or arrays by name: positions "q", velocities "q'" or momenta "p_q", parameters. Arrays are
-    broadcast as NumPy does it, then flattened in C order: a sparse grid of 3 x 1 and 1 x 4 makes 12 trajectories. ``keep``: formulas such as "first(b = pi)", "max(H)", in place of the last states. ``every``: keep each
-    such state of all trajectories too; ``states(i)`` of the Sweep returns them. ``measure``: errors by companions, which
-    take 3/2 of the sweep's time. ``beyond_horizon``: trajectories of which nothing is left are no failures.
+    broadcast as NumPy does it, then flattened in C order: a sparse grid of 3 x 1 and 1 x 4 makes 12 trajectories.
+    ``keep``: formulas such as "first(b = pi)", "max(H)", in place of the last states. ``every``: keep each such state of
+    all trajectories too; ``states(i)`` of the Sweep returns them. ``measure``: errors by companions, which take 3/2 of
+    the sweep's time. ``beyond_horizon``: trajectories of which nothing is left are no failures.
     """
     scene = _scene(scene)
     columns = _columns(starts)
@@ -121,8 +122,7 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
     scene = _scene(scene)
     begin, end = (float(time) for time in t_span)
     if begin != 0 or end < 0:
-        raise InputError(f"t_span: a scene begins at t = 0 and goes on to later times, not from {begin:g} to "
-                                  f"{end:g}")
+        raise InputError(f"t_span: a scene begins at t = 0 and goes on to later times, not from {begin:g} to {end:g}")
     if "until" in settings:
         raise InputError("until: the end stands in t_span")
     if t_eval is not None:

@@ -291,6 +291,7 @@ double energy_defect(const Kernel& kernel, const Kernel& exact_kernel, const std
     if (stepper.prepare(parameters, step) != LOBATTO_OK ||
         exact.prepare({parameters.begin(), parameters.end()}, step) != LOBATTO_OK)
         throw ComputationError("the energy cannot be compared: a kernel refuses the scene's values");
+    constexpr double least = 1e-300;  // what is less has lost digits in a double
     real difference = 0, largest = 0;
     bool is_compared = false;
     for (const auto& [position, momentum] : states) {
@@ -303,10 +304,11 @@ double energy_defect(const Kernel& kernel, const Kernel& exact_kernel, const std
             throw ComputationError("the energy cannot be compared: a kernel refuses a state");
         real kinetic = 0;
         for (std::size_t k = 0; k < q.size(); ++k) kinetic += p[k] * velocity[k] / 2;
-        if (magnitude(kinetic) + magnitude(H - kinetic) > real(std::numeric_limits<double>::max()) / 4) continue;
+        const real size = magnitude(kinetic) + magnitude(H - kinetic), apart = magnitude(real(H_double) - H);
+        if (size > real(std::numeric_limits<double>::max()) / 4) continue;
         is_compared = true;
-        difference = std::max(difference, magnitude(real(H_double) - H));
-        largest = std::max(largest, magnitude(kinetic) + magnitude(H - kinetic));
+        if (apart > least) difference = std::max(difference, apart);
+        largest = std::max(largest, size);
     }
     if (!is_compared) return std::nan("");
     return difference > 0 ? static_cast<double>(difference / largest) : 0.0;

@@ -265,22 +265,22 @@ TEST_CASE("values that are set later must keep what those of the scene do") {
 }
 
 TEST_CASE("a state that rounding leaves behind a wall may be a start, one that is behind it may not") {
-    // Three equal balls, the middle one at rest but for rounding. Two units: the coordinates differ by 1e6, the metric
-    // of the kinetic energy makes them equal.
-    const auto balls = [](const std::string& first, const std::string& second) {
+    // Two oscillators of which one rests at a wall, in units that differ by 1e6: the metric of the kinetic energy makes
+    // them equal.
+    const auto oscillators = [](const std::string& first, const std::string& second) {
         return fmt::format(
             "lagrangian = \"(x'^2 + y'^2*1e12)/2 - x^2/2 - y^2*1e12/2\"\n[coordinates]\n"
             "x = {{ position = {}, velocity = 0 }}\ny = {{ position = {}, velocity = 0 }}\n"
             "[impacts]\nwall = {{ when = \"y = 0 falling\" }}\n{}",
             first, second, method("points = 4", 0.05, 3));
     };
-    const Ended ended = run(balls("1", "-1e-21"));
+    const Ended ended = run(oscillators("1", "-1e-21"));
     CHECK(ended.result.status == LOBATTO_OK);
     CHECK(std::fabs(ended.result.q[0] - std::cos(3.0)) < 1e-5);
     CHECK(std::fabs(ended.result.q[1]) < 1e-20);
     // As far behind it as rounding of x would be if both were of one unit.
-    CHECK_THROWS_WITH(run(balls("1", "-1e-16")), doctest::Contains("or is behind a wall"));
-    CHECK(refusal(balls("1", "-1e-12")).find("behind the wall wall") != std::string::npos);
+    CHECK_THROWS_WITH(run(oscillators("1", "-1e-16")), doctest::Contains("or is behind a wall"));
+    CHECK(refusal(oscillators("1", "-1e-12")).find("behind the wall wall") != std::string::npos);
 }
 
 TEST_CASE("impacts that accumulate end the run, with the state before that step") {

@@ -53,9 +53,10 @@ def test_scenes_and_runs_go_to_other_processes(pendulum):
     again = pickle.loads(pickle.dumps(pendulum))
     assert again.text == pendulum.text and again.path == pendulum.path
     run = lobatto.run(pendulum, until=2)
+    between = run(1.234)
     other = pickle.loads(pickle.dumps(run))
     assert numpy.array_equal(other.q, run.q) and other.error == run.error
-    assert numpy.array_equal(other(1.234).q, run(1.234).q)
+    assert numpy.array_equal(other(1.234).q, between.q)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         assert numpy.array_equal(pool.apply(lobatto.run, (pendulum,), {"until": 2}).q, run.q)
 
@@ -239,7 +240,6 @@ def test_a_sweep_broadcasts_as_numpy_does(pendulum):
         lobatto.sweep(pendulum, {"q": [1, 2], "omega": [1, 2, 3]})
     with pytest.raises(lobatto.InputError, match="q has masked values"):
         lobatto.sweep(pendulum, {"q": numpy.ma.masked_less([0.5, 1], 0.7)})
-
 
 
 def test_a_sweep_keeps_states_on_the_way(pendulum):

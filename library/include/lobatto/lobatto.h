@@ -123,6 +123,7 @@ LOBATTO_C_API double lobatto_integrator_step_size(const lobatto_integrator* inte
 LOBATTO_C_API double lobatto_integrator_t(const lobatto_integrator* integrator);
 LOBATTO_C_API const double* lobatto_integrator_q(const lobatto_integrator* integrator);
 LOBATTO_C_API const double* lobatto_integrator_p(const lobatto_integrator* integrator);
+/* Not a number where the scene leaves it out (energy = false) and the motion does not conserve it. */
 LOBATTO_C_API double lobatto_integrator_energy(const lobatto_integrator* integrator);
 
 /* --- Runs -------------------------------------------------------------------------------------------------------- */

@@ -203,7 +203,8 @@ public:
     const double* q() const;   ///< n; the same place for as long as the stepper lives
     const double* p() const;
     std::vector<double> velocity() const;
-    double energy() const;                    ///< H(t, q, p); not a number where the scene leaves it out
+    /// H(t, q, p); not a number where the scene leaves it out (energy = false) and the motion does not conserve it.
+    double energy() const;
     std::vector<double> multipliers() const;  ///< of the constraints, here
     /// Position and velocity inside the last step, on its own polynomial: t - step_size() <= t <= t().
     std::pair<std::vector<double>, std::vector<double>> at(double t) const;

@@ -70,11 +70,12 @@ struct Walls {
         if (status != Status::ok) return status;
         const real impulse = -(real(1) + restitution[w]) * approach[w] * side(stepper, w) / mobility;
         if (!is_finite(impulse)) return Status::not_finite;
-        for (int c = 0; c < n; ++c) {
-            velocity[c] += impulse * change[c];
-            p[c] += impulse * gradient[w * n + c];
+        if constexpr (constraints_of<K>() > 0) {
+            for (int c = 0; c < n; ++c) velocity[c] += impulse * change[c];
+            stepper.momentum(time, q, velocity, p);
+        } else {
+            for (int c = 0; c < n; ++c) p[c] += impulse * gradient[w * n + c];
         }
-        if constexpr (constraints_of<K>() > 0) stepper.momentum(time, q, velocity, p);
         return look(stepper, time, q, p);
     }
 
@@ -113,12 +114,13 @@ private:
         for (int c = 0; c < n; ++c) pushed[c] = rest[c] + gradient[w * n + c];
         Status status = stepper.velocity(time, q, rest, without);
         if (status == Status::ok) status = stepper.velocity(time, q, pushed, change);
+        if (status != Status::ok) return status;
         mobility = real(0);
         for (int c = 0; c < n; ++c) {
             change[c] -= without[c];
             mobility += gradient[w * n + c] * change[c];
         }
-        return status;
+        return Status::ok;
     }
 
     void look_at_impacts(S& stepper) {
