@@ -396,6 +396,11 @@ TEST_CASE("an automatic clock follows the poles of the Lagrangian") {
     CHECK(std::fabs(clock_of("(x'^2 + y'^2)/2 - 2*(x^2 + y^2)^(-1) - x^4") - 16) < 1e-13);  // as before
     CHECK(std::fabs(clock_of("(1 + 1/x^2)*(x'^2 + y'^2)/2 + 3/x + 1/sqrt(x^2 + y^2)") - 8) <
           1e-14);  // masses do not count
+    // Numerators that are 0 at the start, or become negative: r^-2 and r^-3 in their places.
+    CHECK(std::fabs(clock_of("(x'^2 + y'^2)/2 + x*y/(x^2 + y^2)^2") - 16) < 1e-13);
+    CHECK(std::fabs(clock_of("(x'^2 + y'^2)/2 - 3*cos(y)*(x^2 - y^2)/sqrt(x^2 + y^2)^5") - 32) < 1e-13);
+    CHECK_THROWS_WITH_AS(clock_of("(x'^2 + y'^2)/2 - x^2/(x^2 + y^2)"), doctest::Contains("and there is none"),
+                         InputError);
     CHECK_THROWS_WITH_AS(clock_of("(x'^2 + y'^2)/2 - x^2/2"), doctest::Contains("and there is none; write a formula"),
                          InputError);
 }

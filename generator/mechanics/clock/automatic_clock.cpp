@@ -17,29 +17,45 @@ bool holds(const ex& expression, const Symbols& symbols) {
     return std::any_of(symbols.begin(), symbols.end(), [&](const GiNaC::symbol& s) { return expression.has(s); });
 }
 
-// The degree of a polynomial in the positions, all of them together; 1 for what is none.
-GiNaC::numeric degree_of(const ex& base, const Symbols& positions) {
+// The degree of a polynomial in the positions, all of them together, `least` at least; that of what is none.
+GiNaC::numeric degree_of(const ex& base, const Symbols& positions, int least) {
     const GiNaC::symbol scale("scale");
     GiNaC::exmap scaled;
     for (const GiNaC::symbol& q : positions) scaled[q] = scale * q;
     const ex whole = base.subs(scaled, GiNaC::subs_options::no_pattern).expand();
-    return whole.is_polynomial(scale) ? GiNaC::numeric(std::max(whole.degree(scale), 1)) : GiNaC::numeric(1);
+    return whole.is_polynomial(scale) ? std::max(whole.degree(scale), least) : least;
 }
 
-// Of a term: the degree of its pole, r^-k; nothing where it has none.
-std::optional<GiNaC::numeric> pole_of(const ex& term, const Symbols& positions) {
-    std::optional<GiNaC::numeric> largest;
+struct Pole {
+    ex term;
+    GiNaC::numeric degree;  // k of r^-k
+};
+
+// Of a term; nothing where it has none. A numerator may change its sign, where a clock would stop: r^d stands for one
+// of degree d.
+std::optional<Pole> pole_of(const ex& term, const Symbols& positions) {
+    GiNaC::numeric largest = 0, above = 0;
+    ex constant = 1, numerator = 1, denominator = 1;
     const auto look = [&](const ex& factor) {
-        if (!GiNaC::is_a<GiNaC::power>(factor) || !GiNaC::is_a<GiNaC::numeric>(factor.op(1))) return;
-        const GiNaC::numeric exponent = GiNaC::ex_to<GiNaC::numeric>(factor.op(1));
-        if (!exponent.is_negative() || !holds(factor.op(0), positions)) return;
-        const GiNaC::numeric k = -exponent * degree_of(factor.op(0), positions);
-        if (!largest || k > *largest) largest = k;
+        const bool is_power = GiNaC::is_a<GiNaC::power>(factor) && GiNaC::is_a<GiNaC::numeric>(factor.op(1));
+        const GiNaC::numeric exponent = is_power ? GiNaC::ex_to<GiNaC::numeric>(factor.op(1)) : 1;
+        if (!holds(factor, positions)) {
+            constant *= factor;
+        } else if (exponent.is_negative()) {
+            denominator *= factor;
+            largest = std::max(largest, -exponent * degree_of(factor.op(0), positions, 1));
+        } else {
+            numerator *= factor;
+            above += degree_of(factor, positions, 0);
+        }
     };
-    look(term);
     if (GiNaC::is_a<GiNaC::mul>(term))
         for (const ex& factor : term) look(factor);
-    return largest;
+    else
+        look(term);
+    const GiNaC::numeric degree = largest - above;
+    if (!degree.is_positive()) return std::nullopt;
+    return Pole{numerator.is_equal(1) ? term : constant * GiNaC::pow(denominator, degree / largest), degree};
 }
 
 // The terms of L that have one, without velocities; the least degree.
@@ -57,10 +73,10 @@ Poles poles_of(const Scene& scene) {
     motion.insert(motion.end(), velocities.begin(), velocities.end());
     Poles poles;
     for (const ex& term : terms_of(scene.lagrangian, motion)) {
-        const auto k = holds(term, velocities) ? std::nullopt : pole_of(term, positions);
-        if (!k) continue;
-        if (!poles.least || *k < *poles.least) poles.least = k;
-        poles.terms.push_back(term);
+        const auto pole = holds(term, velocities) ? std::nullopt : pole_of(term, positions);
+        if (!pole) continue;
+        if (!poles.least || pole->degree < *poles.least) poles.least = pole->degree;
+        poles.terms.push_back(pole->term);
     }
     return poles;
 }
