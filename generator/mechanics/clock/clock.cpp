@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <stdexcept>
 
 #include "generator/mechanics/clock/automatic_clock.hpp"
 #include "generator/mechanics/system/system.hpp"
@@ -136,7 +137,11 @@ private:
 
 Scene in_clock_time(const Scene& scene) {
     if (!scene.clock || scene.clock->is_applied) return scene;
-    return Transformation(scene).transform();
+    try {
+        return Transformation(scene).transform();
+    } catch (const std::domain_error&) {
+        fail_at_clock(scene, "the clock, or the Lagrangian, has no finite value at the start");
+    }
 }
 
 void refuse_clock(const Scene& scene, const std::string& what) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 namespace lobatto {
 
@@ -35,7 +36,12 @@ void require_start_before_walls(const Scene& scene) {
     start[scene.time] = 0;
     for (const Impact& impact : scene.impacts) {
         const auto value_at = [&](const GiNaC::exmap& place) {
-            return scene.evaluate(impact.when.value.subs(place), "the wall " + impact.written).to_double();
+            try {
+                return scene.evaluate(impact.when.value.subs(place), "the wall " + impact.written).to_double();
+            } catch (const std::domain_error&) {
+                scene.source.fail(impact.when.at,
+                                  "the wall " + impact.written + " has no finite value where the motion starts");
+            }
         };
         const auto rounded_value = [&] {
             double most = 0;
