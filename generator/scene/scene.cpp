@@ -338,11 +338,15 @@ GiNaC::ex Scene::along_motion(GiNaC::ex formula) const {
     return formula;
 }
 
+GiNaC::numeric Scene::value_of(const GiNaC::ex& expression, const std::vector<GiNaC::ex>& given) const {
+    if (symbols_of(expression).empty()) return real_value(expression, {});  // as values of most parameters
+    return real_value(expression, values_of(parameters, given));
+}
+
 GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,
                                const std::vector<GiNaC::ex>& given) const {
     try {
-        if (symbols_of(expression).empty()) return real_value(expression, {});  // as values of most parameters
-        return real_value(expression, values_of(parameters, given));
+        return value_of(expression, given);
     } catch (const NoValue& error) {
         throw InputError(fmt::format("{}: {} has no finite real value: {}", printable(path), what, error.what()));
     }

@@ -223,7 +223,9 @@ struct Scene {
     GiNaC::ex along_motion(GiNaC::ex formula) const;
 
     // The value of an expression in the parameters, with the parameters at their scene values unless given, in scene
-    // order: 60 decimal digits; throws InputError naming `what` when it is not a finite real number.
+    // order: 60 decimal digits; throws NoValue when it is not a finite real number.
+    GiNaC::numeric value_of(const GiNaC::ex& expression, const std::vector<GiNaC::ex>& parameter_values = {}) const;
+    // The same; throws InputError naming `what`.
     GiNaC::numeric evaluate(const GiNaC::ex& expression, const std::string& what,
                             const std::vector<GiNaC::ex>& parameter_values = {}) const;
 };

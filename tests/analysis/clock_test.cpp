@@ -418,7 +418,7 @@ TEST_CASE("what has no clock says so") {
           "clock.toml:10:9: the clock is -0.5 at the start; it must be positive wherever the motion goes");
     for (const char* pole : {"1/y", "log(y)", "1/(x - 1)"})
         CHECK(refusal(kepler(0, fmt::format("clock = \"{}\"", pole), "step = 0.1\nuntil = 1")) ==
-              "clock.toml:10:9: the clock, or the Lagrangian, has no finite value at the start");
+              "clock.toml:10:9: the clock, or the Lagrangian, has no finite real value at the start");
     CHECK(refusal(kepler(0.5, "clock = \"r\"", "step = 0.1\nuntil = 1\n[forces]\nx = \"-x'\"")) ==
           "clock.toml:10:9: a clock needs a motion that keeps its energy, but a force acts on x; remove the clock, or "
           "the "

@@ -93,8 +93,7 @@ ex automatic_clock(const Scene& scene) {
                       "clock = \"auto\" looks for terms of the Lagrangian that grow without bound, such as 1/r, and "
                       "there is none; write a formula");
     ex U = 0;
-    for (const ex& term : poles.terms)
-        U += scene.evaluate(term.subs(start), "the clock at the start").is_negative() ? -term : term;
+    for (const ex& term : poles.terms) U += scene.value_of(term.subs(start)).is_negative() ? -term : term;
     return GiNaC::pow(U / U.subs(start), -(GiNaC::numeric(1) / *poles.least + GiNaC::numeric(1, 2)));
 }
 

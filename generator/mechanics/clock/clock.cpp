@@ -89,7 +89,7 @@ public:
 
 private:
     void require_positive_rate() const {
-        const GiNaC::numeric rate = scene_.evaluate(at_start(g_), "the clock at the start");
+        const GiNaC::numeric rate = scene_.value_of(at_start(g_));
         if (!rate.is_positive())
             fail_at_clock(scene_,
                           fmt::format("the clock is {:.6g} at the start; it must be positive wherever the motion goes",
@@ -140,7 +140,7 @@ Scene in_clock_time(const Scene& scene) {
     try {
         return Transformation(scene).transform();
     } catch (const std::domain_error&) {
-        fail_at_clock(scene, "the clock, or the Lagrangian, has no finite value at the start");
+        fail_at_clock(scene, "the clock, or the Lagrangian, has no finite real value at the start");
     }
 }
 

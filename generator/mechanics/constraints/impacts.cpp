@@ -37,10 +37,10 @@ void require_start_before_walls(const Scene& scene) {
     for (const Impact& impact : scene.impacts) {
         const auto value_at = [&](const GiNaC::exmap& place) {
             try {
-                return scene.evaluate(impact.when.value.subs(place), "the wall " + impact.written).to_double();
+                return scene.value_of(impact.when.value.subs(place)).to_double();
             } catch (const std::domain_error&) {
                 scene.source.fail(impact.when.at,
-                                  "the wall " + impact.written + " has no finite value where the motion starts");
+                                  "the wall " + impact.written + " has no finite real value where the motion starts");
             }
         };
         const auto rounded_value = [&] {
