@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "generator/mechanics/clock/clock.hpp"
+
 namespace lobatto {
 
 namespace {
@@ -43,9 +45,30 @@ std::vector<GiNaC::symbol> variables_of(const Scene& scene) {
 
 }  // namespace
 
-Reductions::Reductions(const Scene& scene) : n_(scene.coordinates.size()), parameters_(scene.parameters.size()) {
+void ClockedMean::observe(double time, double value, double rate, bool is_step) {
+    if (last_.is_step) {
+        if (step_.is_step) {
+            sum_ += (step_.value * step_.rate + last_.value * last_.rate) / 2;
+            weight_ += (step_.rate + last_.rate) / 2;
+        }
+        step_ = last_;
+    }
+    if (!begin_) begin_ = time;
+    last_ = {time, value, rate, is_step};
+}
+
+double ClockedMean::result() const {
+    if (!step_.is_step) return last_.value;
+    const double whole = step_.time - *begin_, rest = last_.time - step_.time,
+                 of_rest = (step_.value * step_.rate + last_.value * last_.rate) / (step_.rate + last_.rate);
+    return (weight_ > 0 ? sum_ / weight_ * whole + of_rest * rest : of_rest * rest) / (whole + rest);
+}
+
+Reductions::Reductions(const Scene& scene, const Arrivals& arrivals)
+    : n_(scene.coordinates.size()), parameters_(scene.parameters.size()), arrivals_(arrivals) {
     const std::vector<GiNaC::symbol> variables = variables_of(scene);
     variables_.resize(variables.size());
+    if (scene.clock) rate_ = Tape::of(clock_rate(scene), variables);
     for (const Reduction& kept : scene.outputs.kept) {
         Part part{kept_of(kept.of), kept.event, std::nullopt};
         if (part.of != Kept::first && part.of != Kept::count) {
@@ -64,7 +87,11 @@ void Reductions::begin(const LoadedStepper<double>& stepper, const EnsembleStart
     stepper_ = &stepper;
     std::copy(start.parameters.begin(), start.parameters.end(), variables_.begin());
     has_begun_ = false;
-    for (Part& part : parts_) part.number.begin(part.of);
+    for (Part& part : parts_) {
+        part.number.begin(part.of);
+        part.mean = {};
+    }
+    arrived_ = 0;
 }
 
 void Reductions::observe(const double* rows, std::int64_t count) {
@@ -82,13 +109,27 @@ void Reductions::observe(const double* rows, std::int64_t count) {
         at = std::copy(v_.begin(), v_.end(), at);
         at = std::copy(p_.begin(), p_.end(), at);
         *at = energy;
-        for (Part& part : parts_)
-            if (part.formula)
-                part.number.observe(part.of, (*part.formula)(variables_), row[0] - last_time_, !has_begun_);
         if (!has_begun_) first_time_ = row[0];
+        const bool is_step = !is_arrival(row[0]) || !has_begun_;
+        for (Part& part : parts_) {
+            if (!part.formula) continue;
+            const double value = (*part.formula)(variables_);
+            part.number.observe(part.of, value, row[0] - last_time_, !has_begun_);
+            if (rate_ && part.of == Kept::mean) part.mean.observe(row[0], value, (*rate_)(variables_), is_step);
+        }
         last_time_ = row[0];
         has_begun_ = true;
     }
+}
+
+// Of a motion with a clock: whether a state is one of those that are asked for at equal times.
+bool Reductions::is_arrival(double time) {
+    if (arrivals_.interval == 0) return false;
+    double next = first_time_ + static_cast<double>(arrived_) * arrivals_.interval;
+    if ((next - arrivals_.end) * arrivals_.interval > 0) next = arrivals_.end;
+    if (time != next) return false;
+    ++arrived_;
+    return true;
 }
 
 void Reductions::observe_events(const double* rows, std::int64_t count) {
@@ -104,7 +145,9 @@ void Reductions::observe_events(const double* rows, std::int64_t count) {
 
 std::vector<double> Reductions::values() const {
     std::vector<double> values;
-    for (const Part& part : parts_) values.push_back(part.number.result(part.of, last_time_ - first_time_));
+    for (const Part& part : parts_)
+        values.push_back(rate_ && part.of == Kept::mean ? part.mean.result()
+                                                        : part.number.result(part.of, last_time_ - first_time_));
     return values;
 }
 

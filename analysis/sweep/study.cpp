@@ -34,13 +34,13 @@ std::int64_t prime_from(std::int64_t number) {
 }
 
 // After how many steps a state is kept: as often as the user asks for, and about 61 times in all if companions are
-// compared.
-std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool measures) {
+// compared. With a clock the steps are arrivals.
+std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool measures, bool has_clock) {
     constexpr std::int64_t comparisons = 61, most_tried = 1000;  // no part of times that one writes
+    const std::int64_t fewest = has_clock ? 1 : fewest_driven_steps;
     if (!measures || steps == 0) return every;
-    if (every == 0 || every > steps)
-        return prime_from(std::max(fewest_driven_steps, (steps + comparisons - 1) / comparisons));
-    const std::int64_t wanted = std::min(comparisons * every / steps, every / fewest_driven_steps);
+    if (every == 0 || every > steps) return prime_from(std::max(fewest, (steps + comparisons - 1) / comparisons));
+    const std::int64_t wanted = std::min(comparisons * every / steps, every / fewest);
     for (std::int64_t parts = std::max<std::int64_t>(1, wanted); parts <= std::min(every, wanted + most_tried); ++parts)
         if (every % parts == 0) return every / parts;
     return every;
@@ -236,11 +236,12 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
     request.tolerance = scene.method.tolerance;
     request.arrivals = arrivals_of(scene, setting.steps.count);
     request.arrivals.keeps_chain = false;
-    request.every = looked_at(kept_by_sweeps(options_.overrides, scene), setting.steps.count, options_.measures);
+    request.every = looked_at(kept_by_sweeps(options_.overrides, scene), setting.steps.count, options_.measures,
+                              scene.clock.has_value());
     request.threads = options_.threads;
     request.stops = !scene.run.stops.empty();
     if (!scene.outputs.kept.empty())  // threads copy it: formulas are not for several at once
-        request.reducer = [reductions = std::make_shared<const Reductions>(scene)] {
+        request.reducer = [reductions = std::make_shared<const Reductions>(scene, request.arrivals)] {
             return std::make_unique<Reductions>(*reductions);
         };
     return request;

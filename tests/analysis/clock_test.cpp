@@ -252,6 +252,45 @@ TEST_CASE("sweeps of scenes with a clock measure their errors") {
     CHECK(finished.err.find("stability limit") == std::string::npos);  // h is 0.6 of the clock's time, not of t
 }
 
+TEST_CASE("a sweep with a clock compares all that comes before a stop, also where an event holds the time") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", "time = \"t\"\n" + kepler(0.5, "points = 10\nclock = \"auto\"",
+                                                                      "step = 0.1\nuntil = 12\n"
+                                                                      "stop = [\"t = 3.3\", \"x = -0.9 falling\"]"));
+    for (const std::vector<std::string>& every : {{}, {"--every", "0.1"}, std::vector<std::string>{"--every", "0.5"}}) {
+        std::vector<std::string> command{LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary",
+                                         "e=0.3,0.5,0.6", "-o",    folder / "sweep.csv"};
+        command.insert(command.end(), every.begin(), every.end());
+        const test::Finished finished = test::run(command);
+        INFO(finished.err);
+        CHECK(finished.exit_code == 0);
+        const auto rows = test::read_trajectory(folder / "sweep.csv").rows;
+        CHECK(rows.back().back() < 1e-12);  // the error of the last trajectory
+    }
+}
+
+TEST_CASE("means over a motion with a clock are those over the time") {
+    const test::TemporaryFolder folder;
+    const double pi = std::acos(-1);
+    test::write_text(folder / "scene.toml",
+                     kepler(0.5, "points = 9\nclock = \"auto\"", "step = \"0.7*(1 - e)^(3/2)\"\nuntil = \"20*pi\""));
+    const test::Finished finished =
+        test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "e=0.3,0.5,0.6", "--keep",
+                   "mean(x), mean(x^2 + y^2), mean(2 + 0*x)", "-o", folder / "sweep.csv"});
+    INFO(finished.err);
+    REQUIRE(finished.exit_code == 0);
+    const test::TrajectoryTable table = test::read_trajectory(folder / "sweep.csv");
+    REQUIRE(table.rows.size() == 3);
+    for (const auto& row : table.rows) {  // index, e, status, steps, t, the means, the error
+        const double e = row[1];
+        CAPTURE(e);
+        CHECK(std::fabs(row[4] - 20 * pi) < 1e-12);
+        CHECK(std::fabs(row[5] + 3 * e / 2) < 1e-3);  // in t it is 1 to 2 %
+        CHECK(std::fabs(row[6] - 1 - 3 * e * e / 2) < 1e-3);
+        CHECK(std::fabs(row[7] - 2) < 1e-14);
+    }
+}
+
 TEST_CASE("a row of a sweep with a clock is the end of a run, for any number of threads") {
     const test::TemporaryFolder folder;
     test::write_text(folder / "scene.toml", kepler(0.5, "points = 8\nclock = \"r^(3/2)\"", "step = 0.6\nuntil = 50"));

@@ -73,7 +73,7 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
         std::clamp<std::int64_t>(static_cast<std::int64_t>(most_numbers / (2 * groups_.size())), 1, most_comparisons);
     const std::int64_t kept = (request_.steps + request_.every - 1) / request_.every;
     stride_ = request_.every * std::max<std::int64_t>(1, (kept + comparisons - 1) / comparisons);
-    is_driven_ = !outline.system.autonomous;
+    is_driven_ = !outline.system.autonomous && !is_clocked();
     if (is_driven_) stride_ *= (fewest_driven_steps + stride_ - 1) / stride_;
 }
 

@@ -162,7 +162,8 @@ bool EnsembleCompanion::meets_narrow_terms(const EnsembleTrajectory& trajectory,
 
 bool EnsembleCompanion::goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) {
     if (trajectory.has_near_cuts || meets_narrow_terms(trajectory, start)) return true;
-    if (outline_.system.autonomous) return false;
+    const bool is_clocked = request_.arrivals.interval != 0;  // events alone may hold the time then
+    if (outline_.system.autonomous || is_clocked) return false;
     return (request_.every < fewest_driven_steps && request_.every > 0) || has_pulses(start);
 }
 

@@ -36,14 +36,9 @@ void require_conservation(const Scene& scene) {
             "clock, or the time from the Lagrangian");
 }
 
-ex rate_of(const Scene& scene) {
-    require_conservation(scene);
-    return scene.clock->is_automatic ? automatic_clock(scene) : scene.clock->rate;
-}
-
 class Transformation {
 public:
-    explicit Transformation(const Scene& scene) : scene_(scene), g_(rate_of(scene)) {
+    explicit Transformation(const Scene& scene) : scene_(scene), g_(clock_rate(scene)) {
         for (const Coordinate& coordinate : scene.coordinates) {
             q_.push_back(coordinate.position);
             v_.push_back(coordinate.velocity);
@@ -134,6 +129,12 @@ private:
 };
 
 }  // namespace
+
+ex clock_rate(const Scene& scene) {
+    if (scene.clock->is_applied) return scene.clock->rate;
+    require_conservation(scene);
+    return scene.clock->is_automatic ? automatic_clock(scene) : scene.clock->rate;
+}
 
 Scene in_clock_time(const Scene& scene) {
     if (!scene.clock || scene.clock->is_applied) return scene;

@@ -14,6 +14,9 @@ namespace lobatto {
 // are. InputError where there is no such Lagrangian: explicit time, forces, a clock that is not positive at the start.
 Scene in_clock_time(const Scene& scene);
 
+// g(q). InputError as above.
+GiNaC::ex clock_rate(const Scene& scene);
+
 // InputError where a scene with a clock is given to what knows none: "lobatto stability".
 void refuse_clock(const Scene& scene, const std::string& what);
 
