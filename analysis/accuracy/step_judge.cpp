@@ -149,9 +149,11 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
     const double least = outline.scene.constraints.empty() ? 1 : std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < 2 * n; ++i)
         if (measure[i] < levels[i]) measure[i] = least * levels[i];
+    const std::vector<bool> is_slight =
+        slight_from_rest(sizes, first_step_of(stepper, request.time, request.q, request.p, request.step));
     for (std::size_t k = 0; k < n; ++k)
         for (const std::size_t i : {k, n + k})
-            if (!moves[k] || !moves[i]) measure[i] = std::numeric_limits<double>::infinity();
+            if (!moves[k] || !moves[i] || is_slight[k]) measure[i] = std::numeric_limits<double>::infinity();
     const std::optional<double> unresolved = first_unresolved(stepper, hardest_.states(), request.every, result.time,
                                                               request.parameters, request.step, measure);
     if (unresolved) judgement.unresolved = {1 + std::llround((*unresolved - request.time) / request.step), *unresolved};

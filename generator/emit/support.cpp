@@ -73,15 +73,18 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
 namespace {
 
 // The headers that are included once must know of it.
-std::string with_numbers(const std::string& macro) {
+std::string with_numbers(const std::string& macro, const std::string& otherwise) {
     return fmt::format(
         "#ifndef {0}\n"
         "#ifdef LOBATTO_KERNEL_NUMBERS_HPP\n"
-        "#error \"include this kernel before those in other numbers, or define {0} before all of them\"\n"
+        "#error \"include this kernel before those in other numbers{1}\"\n"
         "#endif\n"
         "#define {0}\n"
         "#endif\n",
-        macro);
+        macro, otherwise);
+}
+std::string with_numbers(const std::string& macro) {
+    return with_numbers(macro, ", or define " + macro + " before all of them");
 }
 
 }  // namespace
@@ -90,7 +93,8 @@ std::string before_support(Precision precision) {
     if (precision == Precision::quadruple) return with_numbers("LOBATTO_USE_FLOAT128");
     if (has_many_digits(precision)) return with_numbers("LOBATTO_USE_MPFR");
     if (precision == Precision::double_double)
-        return "#if defined(__GNUC__) && !defined(__clang__)\n"
+        return with_numbers("LOBATTO_IN_DOUBLE_DOUBLE", "") +
+               "#if defined(__GNUC__) && !defined(__clang__)\n"
                "#pragma GCC optimize(\"no-tree-slp-vectorize\")  // with which g++ 12 loses the low parts of sums\n"
                "#endif\n";
     return "";

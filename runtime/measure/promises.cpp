@@ -179,19 +179,21 @@ Shifts own_shifts(LoadedStepper<__float128>& stepper, const QuadrupleStart& star
     const real h = step;
     Shifts result{std::vector<real>(rows), std::vector<real>(rows)};
     auto& [sizes, shifts] = result;
+    std::vector<real> pace(rows);
     for (std::size_t i = 0; i < rows; ++i) {
-        const real moved =
-            i < n ? std::max(magnitude(h * velocity[i]), magnitude(after[i] - before[i])) : magnitude(h * force[i - n]);
+        pace[i] = magnitude(h * (i < n ? velocity[i] : force[i - n]));
+        const real moved = i < n ? std::max(pace[i], magnitude(after[i] - before[i])) : pace[i];
         sizes[i] = std::max(magnitude(before[i]), magnitude(after[i]));
         shifts[i] = std::max(real(1e-6) * moved, real(1e-14) * magnitude(before[i]));
     }
-    // A component that only rounding moves from 0, as the radial momentum of a circular orbit, has the size that a part
-    // of another would give it.
+    // A component that only rounding or the error of the step moves from 0, as the radial momentum of a circular orbit,
+    // has the size that a part of another would give it.
     const std::vector<real> own = sizes;
     for (std::size_t i = 0; i < rows; ++i) {
         real given = 0;
         for (std::size_t j = 0; j < rows; ++j) given = std::max(given, magnitude(T[i * rows + j]) * own[j]);
-        if (own[i] < real(1e-12) * given) {
+        const bool begins_at_rest = magnitude(before[i]) < real(1e-6) * own[i] && pace[i] < real(1e-6) * own[i];
+        if (own[i] < (begins_at_rest ? real(1) : real(1e-12)) * given) {
             sizes[i] = given;
             shifts[i] = std::max(shifts[i], real(1e-14) * given);
         }

@@ -80,6 +80,53 @@ TEST_CASE("a closed chain at rest, or one that turns as a whole, runs and knows 
     }
 }
 
+TEST_CASE("a coordinate that rests, but for the error of steps, loses no motion") {
+    // x = 1 and y = 0.35 sin t; an orbit beside an oscillator at rest; x = 0 by a force that cancels.
+    struct Case {
+        std::string head, method;
+        double step;
+    };
+    const std::string beside =
+                          "lagrangian = \"(x'^2 + y'^2)/2 - (x^2 + y^2)/2 + x\"\n[coordinates]\n"
+                          "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 0.35 }\n",
+                      orbit =
+                          "lagrangian = \"(x'^2 + y'^2 + z'^2)/2 + 1/sqrt(x^2 + y^2) + 1/z - z^2/2 + 2*z\"\n"
+                          "[coordinates]\nx = { position = 1, velocity = 0 }\n"
+                          "y = { position = 0, velocity = 0.5 }\nz = { position = 1, velocity = 0 }\n",
+                      force =
+                          "lagrangian = \"(x'^2 + y'^2)/2 - (x^2 + y^2)/2\"\n[forces]\n"
+                          "x = \"y'^2 + y^2 - 0.1225\"\n[coordinates]\nx = { position = 0, velocity = 0 }\n"
+                          "y = { position = 0, velocity = 0.35 }\n";
+    for (const Case& tried : {Case{beside, "points = 4\nclock = \"1 + x^2\"", 0.1},
+                              {force, "points = 3", 0.1},
+                              {force, "points = 2", 0.05},
+                              {orbit, "points = 5\nclock = \"auto\"", 0.2}}) {
+        INFO(tried.head << tried.method);
+        const MeasuredScene scene(tried.head + "[method]\n" + tried.method +
+                                  fmt::format("\n[run]\nstep = {}\nuntil = 5\n", tried.step));
+        const test::Finished finished = scene.run();
+        INFO(finished.err);
+        CHECK(finished.exit_code == 0);
+        CHECK(finished.err.find("warning") == std::string::npos);
+        CHECK(printed(finished) < 1e-3);
+        if (tried.head != orbit) {
+            const double error = std::fabs(scene.end()[2] - 0.35 * std::sin(5.0)) / 0.35;
+            CHECK(printed(finished) > error / 2);
+        }
+        CHECK(test::run({LOBATTO_PROGRAM, "sweep", scene.folder / "scene.toml", "--vary", "points=5,6", "-o",
+                         scene.folder / "sweep.csv", "--quiet"})
+                  .exit_code == 0);
+    }
+    // Not so what is slight but begins to move: beyond the stability limit, one way or the other.
+    for (const char* start : {"velocity = 1e-6, position = 0", "velocity = 0, position = 1e-6"})
+        CHECK(MeasuredScene(fmt::format("lagrangian = \"(x'^2 + y'^2)/2 - 1000*x^2/2 - y^2/2\"\n[coordinates]\n"
+                                        "x = {{ {} }}\ny = {{ position = 0, velocity = 0.35 }}\n"
+                                        "[run]\nstep = 0.1\nuntil = 5\n",
+                                        start))
+                  .run()
+                  .exit_code == 3);
+}
+
 TEST_CASE("a mechanism whose motion dies away runs on at rest") {
     const MeasuredScene scene(trapeze(", velocity = 1", "[forces]\n\"h1.angle\" = \"-2*h1.angle'\"\n") +
                               over(0.02, 60));

@@ -18,6 +18,10 @@ constexpr double displaced = 0.01;  // of its amplitude, at the start: what move
 constexpr double held_at_zero = 0x1p-100;
 constexpr double many_roundings = 0x1p-45;  // of the largest amplitude: what starts with more was meant to
 constexpr std::size_t first_compared = 16;  // comparisons: by then other motions are known, if steps are of any use
+constexpr double at_rest = 1e-3;            // of its amplitude: what goes less far in the first step begins at rest
+constexpr double slight = 0.01;             // of the largest amplitude of its kind
+constexpr double slight_product = 1e-5;     // of amplitudes of position and momentum, which does not depend on units
+constexpr double shrinks = 1.3;             // by as much with 2/3 of the step, at least: an error of steps
 
 }  // namespace
 
@@ -111,6 +115,42 @@ void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons
         }
         if (i < n && amplitudes[i] == 0) amplitudes[n + i] = 0;
     }
+}
+
+std::vector<double> first_step_of(LoadedStepper<double>& stepper, double time, const std::vector<double>& q,
+                                  const std::vector<double>& p, double step) {
+    std::vector<double> velocity, Lv, Lq;
+    if (stepper.start(time, q, p) != LOBATTO_OK) return {};  // with a clock it knows its energy from then on
+    if (stepper.velocity(time, q, p, velocity) != LOBATTO_OK) return {};
+    stepper.slopes(time, q, velocity, Lv, Lq);
+    velocity.insert(velocity.end(), Lq.begin(), Lq.end());
+    for (double& pace : velocity) pace = std::fabs(pace * step);
+    return velocity;
+}
+
+std::vector<bool> slight_from_rest(const std::vector<double>& amplitudes, const std::vector<double>& first_step) {
+    const std::size_t n = amplitudes.size() / 2;
+    std::vector<bool> result(n);
+    if (first_step.empty()) return result;
+    double largest[2] = {0, 0}, product = 0;
+    for (std::size_t i = 0; i < 2 * n; ++i) largest[i / n] = std::fmax(largest[i / n], amplitudes[i]);
+    for (std::size_t k = 0; k < n; ++k) product = std::fmax(product, amplitudes[k] * amplitudes[n + k]);
+    for (std::size_t k = 0; k < n; ++k) {
+        result[k] = amplitudes[k] * amplitudes[n + k] < slight_product * product;
+        for (const std::size_t i : {k, n + k})
+            result[k] =
+                result[k] && amplitudes[i] < slight * largest[i / n] && first_step[i] <= at_rest * amplitudes[i];
+    }
+    return result;
+}
+
+void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& first_step,
+                               const std::vector<double>& of_run, const std::vector<double>& of_companion) {
+    const std::vector<bool> is_slight = slight_from_rest(amplitudes, first_step);
+    const std::size_t n = is_slight.size();
+    for (std::size_t k = 0; k < n; ++k)
+        if (is_slight[k] && of_run[k] > shrinks * of_companion[k] && of_run[n + k] > shrinks * of_companion[n + k])
+            amplitudes[k] = amplitudes[n + k] = 0;
 }
 
 std::vector<double> places_of(const std::vector<double>& least, const std::vector<double>& most,

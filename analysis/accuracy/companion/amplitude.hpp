@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "generator/scene/scene.hpp"
+#include "runtime/build/library.hpp"
 
 namespace lobatto {
 
@@ -56,6 +57,20 @@ struct FirstMoves {
 void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& places,
                         double steps, double epsilon, const FirstMoves& first,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
+
+// How far each number would go in the first step at the pace of the start, q then p. Empty where that is refused.
+// `stepper` is prepared.
+std::vector<double> first_step_of(LoadedStepper<double>& stepper, double time, const std::vector<double>& q,
+                                  const std::vector<double>& p, double step);
+
+// Which coordinates begin at rest, without a force, and stay slight beside the others. The error of steps may be all
+// that moves them. `amplitudes`: q, p; `first_step`: as above.
+std::vector<bool> slight_from_rest(const std::vector<double>& amplitudes, const std::vector<double>& first_step);
+
+// Of these the amplitudes become 0 if those of the run are larger than those of the companion, whose steps are shorter:
+// then they are errors of steps.
+void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& first_step,
+                               const std::vector<double>& of_run, const std::vector<double>& of_companion);
 
 // What the rounding of numbers in a range is measured by: the largest size of each, or what constraints make of it
 // (constraint_sizes.hpp; empty: there are none).

@@ -66,10 +66,13 @@ void lose(MeasuredError& error, double time, const std::vector<double>& row) {
 
 std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     const std::size_t n = groups_.size();
-    Range all = range_;
+    Range all = range_, of_companion;
     for (std::size_t j = 0; j < comparisons; ++j)
         for (const std::vector<double>& row : {companion_ranges_[j].least, companion_ranges_[j].most})
-            if (!row.empty()) widen_to(all.least, all.most, row.data(), row.size());
+            if (!row.empty()) {
+                widen_to(all.least, all.most, row.data(), row.size());
+                widen_to(of_companion.least, of_companion.most, row.data(), row.size());
+            }
     std::vector<double> by_constraints;
     constraints_.widen(by_constraints, request_.time, request_.q.data(), parameters_);
     for (std::size_t j = 0; j < comparisons && !constraints_.empty(); ++j)
@@ -96,6 +99,13 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     std::vector<double> start = rounded(request_.whole_q, parts_), momenta = rounded(request_.whole_p, parts_);
     start.insert(start.end(), momenta.begin(), momenta.end());
     leave_out_noise(shared, comparisons, start, pair);
+    if (kernel_->real_kind == LOBATTO_DOUBLE && comparisons > 0) {
+        LoadedStepper<double> at_start(kernel_);
+        if (at_start.prepare(request_.whole_parameters, request_.step) == LOBATTO_OK)
+            leave_out_errors_of_steps(
+                shared, first_step_of(at_start, request_.time, request_.q, request_.p, request_.step),
+                half_of(range_.least, range_.most), half_of(of_companion.least, of_companion.most));
+    }
     if (comparisons == 0) return shared;
     const Range& until_first = companion_ranges_.front();
     leave_out_rounding(shared, comparisons, places, static_cast<double>(request_.steps), run_epsilon_,

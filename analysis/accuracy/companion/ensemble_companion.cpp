@@ -226,10 +226,14 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
                        skipped = is_stopped ? 1 : kept.count - comparisons;
     if (is_stopped && comparisons == 0) return {unknown, false};
     if (known.status != LOBATTO_OK && !(is_stopped && comparisons < compared)) return {unknown, true};
-    std::vector<double> least, most;
+    std::vector<double> least, most, of_companion[2];
     for (std::int64_t i = 0; i < kept.count; ++i) widen_to(least, most, kept.rows + i * kept.columns + 1, 2 * n);
-    for (std::int64_t i = 0; i < 2 * comparisons; ++i)
-        widen_to(least, most, known.ranges.data() + i * static_cast<std::int64_t>(2 * n), 2 * n);
+    const std::vector<double> run_half = half_of(least, most);
+    for (std::int64_t i = 0; i < 2 * comparisons; ++i) {
+        const double* const row = known.ranges.data() + i * static_cast<std::int64_t>(2 * n);
+        widen_to(least, most, row, 2 * n);
+        widen_to(of_companion[0], of_companion[1], row, 2 * n);
+    }
     const auto run_at = [&](std::int64_t j) { return whole_row(kept, skipped + j); };
     const auto companion_at = [&](std::int64_t j) {
         return known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
@@ -247,6 +251,12 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     };
     leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), {kept.rows + 1, kept.rows + kept.columns}, pair);
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
+    if (comparisons > 0 && stepper_.prepare(start.parameters, request_.step) == LOBATTO_OK) {
+        const double* const row = kept.rows + 1;
+        leave_out_errors_of_steps(
+            amplitude, first_step_of(stepper_, request_.time, {row, row + n}, {row + n, row + 2 * n}, request_.step),
+            run_half, half_of(of_companion[0], of_companion[1]));
+    }
     if (comparisons > 0) {
         const auto first = known.ranges.begin(), middle = first + std::ssize(amplitude);
         leave_out_rounding(

@@ -214,6 +214,52 @@ TEST_CASE("standalone kernels of every precision compile with nothing else, run,
     }
 }
 
+TEST_CASE("kernels in double-double stand before others in one file, and keep their digits there") {
+    const test::TemporaryFolder folder;
+    const std::string scene = test::read_file(tree + "/scenes/henon_heiles.toml");
+    for (const auto& [name, numbers] :
+         {std::pair{"first", "double-double"}, {"second", "double"}, {"third", "quadruple"}}) {
+        test::write_text(folder / (std::string(name) + ".toml"), scene);
+        const test::Finished emitted = test::run({LOBATTO_PROGRAM, "emit", folder / (std::string(name) + ".toml"), "-o",
+                                                  folder.string(), "--standalone", "--numbers", numbers});
+        INFO(emitted.err);
+        REQUIRE(emitted.exit_code == 0);
+    }
+    const std::string main_text =
+        "#include <cstdio>\n"
+        "template <class K>\ntypename K::real end() {\n"
+        "    using R = typename K::real;\n"
+        "    lobatto::Stepper<K> stepper;\n"
+        "    const R q[2] = {R(1) / R(10), R(1) / R(3)}, p[2] = {R(3) / R(10), R(1) / R(10)};\n"
+        "    stepper.prepare({}, R(1) / R(10));\n"
+        "    stepper.start(R(0), q, p);\n"
+        "    for (int i = 0; i < 300; ++i) stepper.step();\n"
+        "    return stepper.q[0];\n}\n"
+        "int main() {\n"
+        "    const auto a = end<lobatto::kernels::first>();\n"
+        "    const auto b = end<lobatto::kernels::third>();\n"
+        "    std::printf(\"%.3g %.3g\\n\", double(__float128(a.high) - b + __float128(a.low)),\n"
+        "                double(end<lobatto::kernels::second>() - b));\n}\n";
+    const auto compiled = [&](const std::vector<std::string>& order) {
+        std::string text = "#define LOBATTO_USE_FLOAT128\n";
+        for (const std::string& name : order) text += "#include \"" + name + ".hpp\"\n";
+        test::write_text(folder / "program.cpp", text + main_text);
+        return test::run(
+            {"g++", "-std=gnu++17", "-O2", "-o", folder / "program", folder / "program.cpp", "-lquadmath"});
+    };
+    const test::Finished good = compiled({"first", "second", "third"});
+    INFO(good.err);
+    REQUIRE(good.exit_code == 0);
+    std::istringstream errors(test::run({folder / "program"}).out);
+    double of_double_double = 1, of_double = 0;
+    errors >> of_double_double >> of_double;
+    CHECK(std::fabs(of_double_double) < 1e-28);
+    CHECK(std::fabs(of_double) > 1e-18);
+    const test::Finished refused = compiled({"second", "first", "third"});
+    CHECK(refused.exit_code != 0);
+    CHECK(test::contains(refused.err, "include this kernel before those in other numbers"));
+}
+
 TEST_CASE("the emitted pendulum follows the hand-written one over 1000 steps to round-off") {
     using Emitted = kernels::pendulum;
     Stepper<Emitted> emitted;

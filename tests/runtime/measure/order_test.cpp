@@ -272,6 +272,11 @@ TEST_CASE("the tangent map is measured in the units of the motion: a satellite i
         "x = { position = 7e6, velocity = 0 }\ny = { position = 0, velocity = 8000 }", 5, "m = 1000\nmu = 3.986e14"));
     CHECK(tangent_defect(satellite, {{1000, 3.986e14}, {7e6, 0}, {0, 8e6}}, 20) < 1e-18);  // measured: 2e-20
     CHECK(tangent_defect(quadruple_kernel(test::pendulum_scene(5)), {{1, 1}, {1e6}, {2}}, 0.01) < 1e-18);  // 5e-22
+    // x rests, but for the error of the step.
+    const Kernel resting = quadruple_kernel(
+        test::scene_of("(x'^2 + y'^2)/2 - (x^2 + y^2)/2 + x*(y'^2 + y^2 - 0.1225)",
+                       "x = { position = 0, velocity = 0 }\ny = { position = 0, velocity = 0.35 }", 4));
+    CHECK(tangent_defect(resting, {{}, {0, 0}, {0, 0.35}}, 0.1) < 1e-18);
 }
 
 TEST_CASE("the energy that a periodic motion rounds away step by step is no drift of the method") {
