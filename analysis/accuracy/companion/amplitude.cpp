@@ -144,13 +144,16 @@ std::vector<bool> slight_from_rest(const std::vector<double>& amplitudes, const 
     return result;
 }
 
-void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& first_step,
-                               const std::vector<double>& of_run, const std::vector<double>& of_companion) {
-    const std::vector<bool> is_slight = slight_from_rest(amplitudes, first_step);
-    const std::size_t n = is_slight.size();
+void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& of_run,
+                               const std::vector<double>& of_companion,
+                               const std::function<std::vector<double>()>& first_step) {
+    const std::size_t n = amplitudes.size() / 2;
+    std::vector<bool> may_be = slight_from_rest(amplitudes, std::vector<double>(2 * n, 0.0));
+    for (std::size_t i = 0; i < 2 * n; ++i) may_be[i % n] = may_be[i % n] && of_run[i] > shrinks * of_companion[i];
+    if (std::none_of(may_be.begin(), may_be.end(), [](bool any) { return any; })) return;
+    const std::vector<bool> is_slight = slight_from_rest(amplitudes, first_step());
     for (std::size_t k = 0; k < n; ++k)
-        if (is_slight[k] && of_run[k] > shrinks * of_companion[k] && of_run[n + k] > shrinks * of_companion[n + k])
-            amplitudes[k] = amplitudes[n + k] = 0;
+        if (may_be[k] && is_slight[k]) amplitudes[k] = amplitudes[n + k] = 0;
 }
 
 std::vector<double> places_of(const std::vector<double>& least, const std::vector<double>& most,

@@ -68,9 +68,10 @@ std::vector<double> first_step_of(LoadedStepper<double>& stepper, double time, c
 std::vector<bool> slight_from_rest(const std::vector<double>& amplitudes, const std::vector<double>& first_step);
 
 // Of these the amplitudes become 0 if those of the run are larger than those of the companion, whose steps are shorter:
-// then they are errors of steps.
-void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& first_step,
-                               const std::vector<double>& of_run, const std::vector<double>& of_companion);
+// then they are errors of steps. `first_step` is asked where there is one that may be.
+void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& of_run,
+                               const std::vector<double>& of_companion,
+                               const std::function<std::vector<double>()>& first_step);
 
 // What the rounding of numbers in a range is measured by: the largest size of each, or what constraints make of it
 // (constraint_sizes.hpp; empty: there are none).

@@ -205,6 +205,40 @@ EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& traj
     return {error->end, error->is_lost()};
 }
 
+std::vector<double> EnsembleCompanion::amplitudes(
+    const Records& kept, const Known& known, const std::vector<double>& parameters, std::int64_t comparisons,
+    const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair) {
+    const std::size_t n = groups_.size();
+    std::vector<double> least, most, of_companion[2];
+    for (std::int64_t i = 0; i < kept.count; ++i) widen_to(least, most, kept.rows + i * kept.columns + 1, 2 * n);
+    const std::vector<double> run_half = half_of(least, most);
+    for (std::int64_t i = 0; i < 2 * comparisons; ++i) {
+        const double* const row = known.ranges.data() + i * static_cast<std::int64_t>(2 * n);
+        widen_to(least, most, row, 2 * n);
+        widen_to(of_companion[0], of_companion[1], row, 2 * n);
+    }
+    std::vector<double> by_constraints;
+    for (std::int64_t i = 0; i < kept.count && !constraints_.empty(); ++i) {
+        const double* const row = kept.rows + i * kept.columns;
+        constraints_.widen(by_constraints, row[0], row + 1, parameters);
+    }
+    const std::vector<double> places = places_of(least, most, by_constraints);
+    std::vector<double> amplitude = amplitudes_of(least, most, places, groups_, kernel_->epsilon);
+    leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), {kept.rows + 1, kept.rows + kept.columns}, pair);
+    if (comparisons == 0) return amplitude;
+    leave_out_errors_of_steps(amplitude, run_half, half_of(of_companion[0], of_companion[1]), [&] {
+        const double* const row = kept.rows + 1;
+        return stepper_.prepare(parameters, request_.step) == LOBATTO_OK
+                   ? first_step_of(stepper_, request_.time, {row, row + n}, {row + n, row + 2 * n}, request_.step)
+                   : std::vector<double>();
+    });
+    const auto first = known.ranges.begin(), middle = first + std::ssize(amplitude);
+    leave_out_rounding(
+        amplitude, static_cast<std::size_t>(comparisons), places, static_cast<double>(request_.steps), kernel_->epsilon,
+        {half_of({first, middle}, {middle, middle + std::ssize(amplitude)}), static_cast<double>(every())}, pair);
+    return amplitude;
+}
+
 EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& trajectory) {
     if (request_.steps == 0) return {0, false};
     EnsembleStart start;
@@ -226,47 +260,18 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
                        skipped = is_stopped ? 1 : kept.count - comparisons;
     if (is_stopped && comparisons == 0) return {unknown, false};
     if (known.status != LOBATTO_OK && !(is_stopped && comparisons < compared)) return {unknown, true};
-    std::vector<double> least, most, of_companion[2];
-    for (std::int64_t i = 0; i < kept.count; ++i) widen_to(least, most, kept.rows + i * kept.columns + 1, 2 * n);
-    const std::vector<double> run_half = half_of(least, most);
-    for (std::int64_t i = 0; i < 2 * comparisons; ++i) {
-        const double* const row = known.ranges.data() + i * static_cast<std::int64_t>(2 * n);
-        widen_to(least, most, row, 2 * n);
-        widen_to(of_companion[0], of_companion[1], row, 2 * n);
-    }
     const auto run_at = [&](std::int64_t j) { return whole_row(kept, skipped + j); };
     const auto companion_at = [&](std::int64_t j) {
         return known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
     };
-    std::vector<double> by_constraints;
-    for (std::int64_t i = 0; i < kept.count && !constraints_.empty(); ++i) {
-        const double* const row = kept.rows + i * kept.columns;
-        constraints_.widen(by_constraints, row[0], row + 1, start.parameters);
-    }
-    const std::vector<double> places = places_of(least, most, by_constraints);
-    std::vector<double> amplitude = amplitudes_of(least, most, places, groups_, kernel_->epsilon);
     const auto pair = [&](std::size_t j, std::size_t i) {
         const auto at = static_cast<std::int64_t>(j);
         return std::pair(run_at(at)[i * parts_], companion_at(at)[i * parts_]);
     };
-    leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), {kept.rows + 1, kept.rows + kept.columns}, pair);
-    const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
-    if (comparisons > 0 && stepper_.prepare(start.parameters, request_.step) == LOBATTO_OK) {
-        const double* const row = kept.rows + 1;
-        leave_out_errors_of_steps(
-            amplitude, first_step_of(stepper_, request_.time, {row, row + n}, {row + n, row + 2 * n}, request_.step),
-            run_half, half_of(of_companion[0], of_companion[1]));
-    }
-    if (comparisons > 0) {
-        const auto first = known.ranges.begin(), middle = first + std::ssize(amplitude);
-        leave_out_rounding(
-            amplitude, static_cast<std::size_t>(comparisons), places, static_cast<double>(request_.steps),
-            kernel_->epsilon,
-            {half_of({first, middle}, {middle, middle + std::ssize(amplitude)}), static_cast<double>(every)}, pair);
-    }
+    const std::vector<double> amplitude = amplitudes(kept, known, start.parameters, comparisons, pair);
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio
-                             : static_cast<double>(steps_taken(every)) / static_cast<double>(every),
+                             : static_cast<double>(steps_taken(every())) / static_cast<double>(every()),
                  of_run = 1 / (1 - std::pow(ratio, -kernel_->order));
     Error error{0, false};
     double largest = 0;

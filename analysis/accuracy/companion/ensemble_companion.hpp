@@ -46,6 +46,13 @@ private:
     bool has_pulses(const EnsembleStart& start);
     void move(EnsembleStart& start) const;
     Error alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) const;
+    // As Companion::amplitudes. `pair(j, i)`: number i at comparison j, of the trajectory and of its companion.
+    std::vector<double> amplitudes(const Records& kept, const Known& known, const std::vector<double>& parameters,
+                                   std::int64_t comparisons,
+                                   const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
+    std::int64_t every() const {
+        return request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps);
+    }
 
     Outline outline_;
     Kernel kernel_;
