@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A step that a kernel took, put into the discrete Euler-Lagrange equations that it was derived from.
 #include <algorithm>
+#include <array>
+#include <map>
+#include <string>
 
 #include "generator/check/check.hpp"
 #include "generator/check/discrete_action.hpp"
@@ -13,6 +16,8 @@ namespace {
 class TakenStepCheck : DiscreteAction {
 public:
     TakenStepCheck(const Derivation& derivation, const TakenStep& step) : DiscreteAction(derivation), step_(step) {
+        for (const Coordinate& coordinate : derivation.scene.coordinates)
+            arrays_.push_back(coordinate.written.substr(0, coordinate.written.find('[')));
         for (std::size_t i = 0; i < step.parameters.size(); ++i)
             formulas_.set(system_.parameters[i], step.parameters[i]);
         set(system_.q, step.positions.front());
@@ -35,6 +40,7 @@ public:
         for (const Numbers& positions : path_)
             for (std::size_t k = 0; k < n_; ++k) size[k] = cln::max(size[k], cln::abs(positions[k]));
         Numbers size0 = step_.p0, size1 = step_.p1;  // of the momenta at the ends
+        add_sizes_of_arrays(size, size0, size1);
         if (!system_.constraints.empty()) {
             add_sizes_of_others(size, size0, size1);
             add_sizes_of_constraints(size);
@@ -88,6 +94,24 @@ private:
                 largest[k] = cln::max(largest[k], cln::abs(h_) * weights_[i] * forces[k].size * step_.epsilon);
         }
         return largest;
+    }
+
+    // An iteration ends where all increments together are rounding, so an element of an array is as exact as the one
+    // that moves most.
+    void add_sizes_of_arrays(Numbers& position, Numbers& momentum0, Numbers& momentum1) {
+        std::map<std::string, std::array<cln::cl_R, 3>> largest;
+        for (std::size_t k = 0; k < n_; ++k) {
+            auto& [moved, p0, p1] = largest[arrays_[k]];
+            moved = cln::max(moved, cln::abs(path_.back()[k] - path_.front()[k]));
+            p0 = cln::max(p0, cln::abs(step_.p0[k]));
+            p1 = cln::max(p1, cln::abs(step_.p1[k]));
+        }
+        for (std::size_t k = 0; k < n_; ++k) {
+            const auto& [moved, p0, p1] = largest[arrays_[k]];
+            position[k] = cln::max(position[k], moved);
+            momentum0[k] = p0;
+            momentum1[k] = p1;
+        }
     }
 
     // Constraints pull on all coordinates at once, so that each is rounded beside the others, in the metric of the
@@ -267,6 +291,7 @@ private:
     }
 
     const TakenStep& step_;
+    std::vector<std::string> arrays_;  // of each coordinate, or its own name
     Path path_;
     bool is_solved_ =
         false;  // inside, from both ends: what these lose by rounding, the path loses as that amplifies it

@@ -62,6 +62,24 @@ TEST_CASE("steps on constraints leave rounding, and those of another length of t
     CHECK(leaves(rod("1 + 1e-9*x"), rod("1")) > 1e4);
 }
 
+TEST_CASE("the far end of a chain that hardly moves is as exact as the rest, and no better") {
+    const auto chain = [](const std::string& strength) {
+        return derive(read_scene(Source(
+            "chain.toml", "lagrangian = \"sum(i = 1 .. 24, x[i]'^2)/2 - sum(i = 1 .. 23, (x[i+1] - x[i])^2/2 + " +
+                              strength +
+                              "*(x[i+1] - x[i])^4/4) - x[1]^2/2\"\n[coordinates]\n"
+                              "x = { count = 24, position = \"exp(-(i - 3)^2/3)\", velocity = 0 }\n"
+                              "[method]\npoints = 4\n[run]\nstep = 0.2\nuntil = 1\n")));
+    };
+    const auto leaves = [](const Derivation& derived, const Derivation& taken) {
+        const Kernel kernel = test::kernel_in_own_cache(taken, Precision::double_);
+        const StartIn<double> start = start_in<double>(ExactStart(taken.scene), kernel, 0.2);
+        return trajectory_leaves<double>(derived, kernel, start.parameters, start.q, start.p, 0.2);
+    };
+    CHECK(leaves(chain("1"), chain("1")) < 8);
+    CHECK(leaves(chain("1.00000001"), chain("1")) > 1e4);
+}
+
 TEST_CASE("steps of another system, or of another method, leave more") {
     const Derivation pendulum = derive(test::pendulum_scene(4));
     const Derivation heavier =
