@@ -7,6 +7,9 @@
 // overflows is infinite or not a number, and stays so.
 #ifndef LOBATTO_KERNEL_DOUBLE_DOUBLE_HPP
 #define LOBATTO_KERNEL_DOUBLE_DOUBLE_HPP
+#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ + 0 == 2
+#error "double-double needs sums that are rounded to double: compile without -mfpmath=387"
+#endif
 
 #include <type_traits>
 
