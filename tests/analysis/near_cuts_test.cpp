@@ -39,6 +39,21 @@ double true_place(double k, double time) {
 
 }  // namespace
 
+TEST_CASE("a ball between walls that is at one place after each step has an amplitude") {
+    for (const char* step : {"0.004", "0.002", "0.0199"}) {
+        INFO(step);
+        const test::MeasuredScene scene(
+            fmt::format("lagrangian = \"x'^2/2\"\n[coordinates]\nx = {{ position = 0.003, velocity = 10 }}\n[impacts]\n"
+                        "left = {{ when = \"x = 0 falling\" }}\nright = {{ when = \"x = 0.01 rising\" }}\n"
+                        "[method]\npoints = 3\n[run]\nstep = {}\nuntil = 0.995\n",
+                        step));
+        const test::Finished finished = scene.run();
+        INFO(finished.err);
+        CHECK(finished.exit_code == 0);
+        CHECK(test::absolute_error(finished.out) < 1e-12);
+    }
+}
+
 TEST_CASE("a contact that is shorter than a step is measured, wherever in the steps it lies") {
     struct Case {
         double k, step, until;

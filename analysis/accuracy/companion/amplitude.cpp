@@ -18,6 +18,7 @@ constexpr double displaced = 0.01;  // of its amplitude, at the start: what move
 constexpr double held_at_zero = 0x1p-100;
 constexpr double many_roundings = 0x1p-45;  // of the largest amplitude: what starts with more was meant to
 constexpr std::size_t first_compared = 16;  // comparisons: by then other motions are known, if steps are of any use
+constexpr double part_of_step = 1.0 / 16;   // that is a part of the amplitude of all motions that a step resolves
 constexpr double at_rest = 1e-3;            // of its amplitude: what goes less far in the first step begins at rest
 constexpr double slight = 0.01;             // of the largest amplitude of its kind
 constexpr double slight_product = 1e-5;     // of amplitudes of position and momentum, which does not depend on units
@@ -126,6 +127,11 @@ std::vector<double> first_step_of(LoadedStepper<double>& stepper, double time, c
     velocity.insert(velocity.end(), Lq.begin(), Lq.end());
     for (double& pace : velocity) pace = std::fabs(pace * step);
     return velocity;
+}
+
+void widen_by_pace(std::vector<double>& amplitudes, const std::vector<double>& first_step) {
+    for (std::size_t k = 0; k < first_step.size() / 2; ++k)
+        amplitudes[k] = std::fmax(amplitudes[k], part_of_step * first_step[k]);
 }
 
 std::vector<bool> slight_from_rest(const std::vector<double>& amplitudes, const std::vector<double>& first_step) {

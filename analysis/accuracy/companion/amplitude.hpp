@@ -63,6 +63,10 @@ void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons
 std::vector<double> first_step_of(LoadedStepper<double>& stepper, double time, const std::vector<double>& q,
                                   const std::vector<double>& p, double step);
 
+// Between walls a body may be at one place after each step, of the run and of the companion. A position moves by a part
+// of what it would go in the first step, at least.
+void widen_by_pace(std::vector<double>& amplitudes, const std::vector<double>& first_step);
+
 // Which coordinates begin at rest, without a force, and stay slight beside the others. The error of steps may be all
 // that moves them. `amplitudes`: q, p; `first_step`: as above.
 std::vector<bool> slight_from_rest(const std::vector<double>& amplitudes, const std::vector<double>& first_step);

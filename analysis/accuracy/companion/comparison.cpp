@@ -99,14 +99,17 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     std::vector<double> start = rounded(request_.whole_q, parts_), momenta = rounded(request_.whole_p, parts_);
     start.insert(start.end(), momenta.begin(), momenta.end());
     leave_out_noise(shared, comparisons, start, pair);
-    if (kernel_->real_kind == LOBATTO_DOUBLE && comparisons > 0)
-        leave_out_errors_of_steps(
-            shared, half_of(range_.least, range_.most), half_of(of_companion.least, of_companion.most), [this] {
-                LoadedStepper<double> at_start(kernel_);
-                return at_start.prepare(request_.whole_parameters, request_.step) == LOBATTO_OK
-                           ? first_step_of(at_start, request_.time, request_.q, request_.p, request_.step)
-                           : std::vector<double>();
-            });
+    const auto first_step = [this] {
+        if (kernel_->real_kind != LOBATTO_DOUBLE) return std::vector<double>();
+        LoadedStepper<double> at_start(kernel_);
+        return at_start.prepare(request_.whole_parameters, request_.step) == LOBATTO_OK
+                   ? first_step_of(at_start, request_.time, request_.q, request_.p, request_.step)
+                   : std::vector<double>();
+    };
+    if (kernel_->impacts > 0) widen_by_pace(shared, first_step());
+    if (comparisons > 0)
+        leave_out_errors_of_steps(shared, half_of(range_.least, range_.most),
+                                  half_of(of_companion.least, of_companion.most), first_step);
     if (comparisons == 0) return shared;
     const Range& until_first = companion_ranges_.front();
     leave_out_rounding(shared, comparisons, places, static_cast<double>(request_.steps), run_epsilon_,

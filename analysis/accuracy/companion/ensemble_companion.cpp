@@ -225,13 +225,15 @@ std::vector<double> EnsembleCompanion::amplitudes(
     const std::vector<double> places = places_of(least, most, by_constraints);
     std::vector<double> amplitude = amplitudes_of(least, most, places, groups_, kernel_->epsilon);
     leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), {kept.rows + 1, kept.rows + kept.columns}, pair);
-    if (comparisons == 0) return amplitude;
-    leave_out_errors_of_steps(amplitude, run_half, half_of(of_companion[0], of_companion[1]), [&] {
+    const auto first_step = [&] {
         const double* const row = kept.rows + 1;
         return stepper_.prepare(parameters, request_.step) == LOBATTO_OK
                    ? first_step_of(stepper_, request_.time, {row, row + n}, {row + n, row + 2 * n}, request_.step)
                    : std::vector<double>();
-    });
+    };
+    if (kernel_->impacts > 0) widen_by_pace(amplitude, first_step());
+    if (comparisons == 0) return amplitude;
+    leave_out_errors_of_steps(amplitude, run_half, half_of(of_companion[0], of_companion[1]), first_step);
     const auto first = known.ranges.begin(), middle = first + std::ssize(amplitude);
     leave_out_rounding(
         amplitude, static_cast<std::size_t>(comparisons), places, static_cast<double>(request_.steps), kernel_->epsilon,
