@@ -25,10 +25,11 @@ constexpr double most_every = 9e15;  // the steps that a run can have
                     "'{}' is declared constant in {}, so it is part of the kernel; only run-time parameters can be set",
                     name, scene.path));
     }
-    if (scene.parameters.empty())
-        source.fail({1, 1}, fmt::format("unknown parameter '{}'; {} has no run-time parameters", name, scene.path));
     std::vector<std::string> names;
-    for (const Parameter& parameter : scene.parameters) names.push_back(parameter.written);
+    for (const Parameter& parameter : scene.parameters)
+        if (!parameter.is_side) names.push_back(parameter.written);
+    if (names.empty())
+        source.fail({1, 1}, fmt::format("unknown parameter '{}'; {} has no run-time parameters", name, scene.path));
     source.fail({1, 1},
                 fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
 }
@@ -38,8 +39,9 @@ void set_parameter(const std::string& argument, Scene& scene) {
     const std::size_t equals = argument.find('=');
     if (equals == std::string::npos) source.fail({1, 1}, "expected name=value, such as --set m=2");
     const std::string name = argument.substr(0, equals);
-    const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(),
-                                        [&](const Parameter& p) { return p.written == name || p.name == name; });
+    const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(), [&](const Parameter& p) {
+        return !p.is_side && (p.written == name || p.name == name);
+    });
     if (parameter == scene.parameters.end()) fail_unknown(source, scene, name);
     const Scope scope{nullptr, fmt::format("the value of {}", name), false, {}};
     const Text text = text_of(argument, equals + 1);

@@ -77,7 +77,9 @@ Variable variable_of(const lobatto::Scene& scene, const Parameter& parameter) {
 
 std::vector<Variable> parameters_of(const lobatto::Scene& scene) {
     std::vector<Variable> variables;
-    for (const Parameter& parameter : scene.parameters) variables.push_back(variable_of(scene, parameter));
+    for (const Parameter& parameter : scene.parameters)
+        if (!parameter.is_side)
+            variables.push_back(variable_of(scene, parameter));  // the sides of switches are the last
     return variables;
 }
 std::vector<Variable> inputs_of(const lobatto::Scene& scene) {

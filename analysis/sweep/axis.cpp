@@ -156,6 +156,7 @@ VariedName varied_name(const Scene& scene, const std::string& name, const std::s
     using Role = VariedName::Role;
     std::vector<std::string> names;
     for (std::size_t i = 0; i < scene.parameters.size(); ++i) {
+        if (scene.parameters[i].is_side) continue;
         names.push_back(scene.parameters[i].written);
         if (name == names.back() || name == scene.parameters[i].name) return {Role::parameter, i, name};
     }

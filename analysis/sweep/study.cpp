@@ -171,7 +171,8 @@ Overrides SweepStudy::values_of(std::int64_t index) const {
     starts_->start(index, start);
     Overrides values;
     for (std::size_t k = 0; k < scene_.parameters.size(); ++k)
-        values.set.push_back(fmt::format("{}={}", scene_.parameters[k].written, start.parameters[k]));
+        if (!scene_.parameters[k].is_side)
+            values.set.push_back(fmt::format("{}={}", scene_.parameters[k].written, start.parameters[k]));
     return values;
 }
 

@@ -32,9 +32,10 @@ constexpr double half = 0.5;              // of the seconds, for a first way; th
 constexpr double overtime = 1.25;         // of the seconds: then it is given up
 constexpr double radians_of_step = 0.75;  // h omega of the family's first run
 constexpr int most_refinements = 12;
-constexpr double near = 0.1;      // of the amplitude: steps so far off are too long to converge yet
-constexpr double far_dearer = 2;  // times the seconds of an extrapolation: steps of the family take too long
-constexpr double looser = 100;    // tolerance of the second extrapolation, of the first's
+constexpr double near = 0.1;       // of the amplitude: steps so far off are too long to converge yet
+constexpr double far_dearer = 2;   // times the seconds of an extrapolation: steps of the family take too long
+constexpr double loosest = 1e-10;  // where they still agree in all digits, nothing moves
+constexpr double looser = 100;     // tolerance of the second extrapolation, of the first's
 // At how many places, after the first, the frequency is looked at.
 int frequency_looks(std::size_t n) {
     return n <= 8 ? 120 : n <= 64 ? 24 : 2;
@@ -307,7 +308,8 @@ private:
         }
     }
 
-    // Equal steps of the family that resolve a close encounter may take too long: the same extrapolation, less precise.
+    // Equal steps of the family that resolve a close encounter may take too long: the same extrapolation, less precise,
+    // until it is another one.
     void compare_with_looser(const States& states, double tolerance, double extrapolation_seconds) {
         if (seconds_since(began_) + extrapolation_seconds > overtime * request_.seconds_limit) return;
         std::optional<States> others;
@@ -322,6 +324,8 @@ private:
             std::copy(begin, begin + std::ssize(row), row.begin());
             return &row;
         });
+        if (measured && measured->back() == 0 && tolerance < loosest)
+            return compare_with_looser(states, looser * tolerance, extrapolation_seconds);
         reference_.is_late = false;
         if (measured && measured->back() < reference_.disagreement.back())
             agree(*measured, fmt::format("explicit extrapolation to {:.0e} a step in {}", tolerance,

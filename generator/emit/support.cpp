@@ -83,15 +83,12 @@ std::string with_numbers(const std::string& macro, const std::string& otherwise)
         "#endif\n",
         macro, otherwise);
 }
-std::string with_numbers(const std::string& macro) {
-    return with_numbers(macro, ", or define " + macro + " before all of them");
-}
-
 }  // namespace
 
 std::string before_support(Precision precision) {
-    if (precision == Precision::quadruple) return with_numbers("LOBATTO_USE_FLOAT128");
-    if (has_many_digits(precision)) return with_numbers("LOBATTO_USE_MPFR");
+    if (precision == Precision::quadruple)
+        return with_numbers("LOBATTO_USE_FLOAT128", ", or define LOBATTO_USE_FLOAT128 before all of them");
+    if (has_many_digits(precision)) return with_numbers("LOBATTO_USE_MPFR", "");
     if (precision == Precision::double_double)
         return with_numbers("LOBATTO_IN_DOUBLE_DOUBLE", "") +
                "#if defined(__GNUC__) && !defined(__clang__)\n"

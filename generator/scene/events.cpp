@@ -185,7 +185,7 @@ void SystemReader::add_switches() {
         const GiNaC::numeric value = value_in_range(source_, one.at, one.value, one.text, start);
         const int side = value.is_positive() ? 1 : -1;
         start[one.side] = side;
-        scene_.parameters.push_back({name, "", side, one.side, name});
+        scene_.parameters.push_back({name, "", side, one.side, name, false, true});
         scene_.switches.push_back(one);
     }
 }

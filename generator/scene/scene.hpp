@@ -35,6 +35,7 @@ struct Parameter {
     GiNaC::symbol symbol;
     std::string written = name;  // in formulas: m[3]
     bool is_input = false;       // the host program may give it another value before each step
+    bool is_side = false;        // of a switch: no value that anyone else gives
 };
 
 // An event: the value crosses zero. Located on the step's own polynomial.

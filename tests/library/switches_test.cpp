@@ -177,3 +177,14 @@ TEST_CASE("switches of what grows all the time are passed for ever") {
         "w = { when = \"y = -0.5 + 0.05*sin(3*t) falling\", restitution = 1 }\n[run]\nstep = 0.05\nuntil = 2500\n"));
     CHECK(wall.t.back() == doctest::Approx(2500));
 }
+
+TEST_CASE("the sides of switches are no parameters that others set") {
+    const lob::Scene scene = scene_of(collision("4*max(0, -x)^2"));
+    CHECK(scene.parameters().size() == 1);
+    lob::Stepper stepper(lob::compile(scene));
+    CHECK_THROWS_WITH_AS(stepper.set("side_1", -1), "unknown parameter 'side_1'; declared: m.", lob::InputError);
+    lob::Settings settings;
+    settings.set = {{"side_1", "-1"}};
+    CHECK_THROWS_WITH_AS(lob::compile(scene, settings), doctest::Contains("unknown parameter 'side_1'; declared: m."),
+                         lob::InputError);
+}
