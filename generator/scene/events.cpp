@@ -136,6 +136,14 @@ void SystemReader::read_reset(const Entry& entry, Impact& impact, const Scope& s
         (is_rate ? impact.reset_velocity : impact.reset_position)[k] =
             evaluate(source_, parse_formula(source_, formula_of(source_, line), scope), scope, indices).expression;
     }
+    bool changes = false;
+    for (std::size_t k = 0; k < scene_.coordinates.size(); ++k)
+        changes = changes || !impact.reset_position[k].is_equal(scene_.coordinates[k].position) ||
+                  !impact.reset_velocity[k].is_equal(scene_.coordinates[k].velocity);
+    if (!changes)
+        fail(entry.at,
+             fmt::format("this reset changes nothing; say what follows an impact, as in {{ \"{0}'\" = \"-{0}'\" }}",
+                         scene_.coordinates.front().written));
 }
 
 // What a kernel computes of the scene.

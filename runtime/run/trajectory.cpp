@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <utility>
 
 namespace lobatto {
 
@@ -245,25 +246,29 @@ public:
     }
 
 private:
-    static constexpr std::int64_t first_look = std::int64_t(1) << 18;
-    static constexpr double hopeless = 1e5;
+    static constexpr std::int64_t first_look = std::int64_t(1) << 16, long_run = std::int64_t(1) << 18;
+    static constexpr double hopeless = 1e5, shrinks = 0.9, far = 4;
 
     // A clock that comes to 0 in a finite time lets its steps pass ever less of it. At every doubling of the steps:
-    // whether the rest of the way would take more than `hopeless` times as many as the last half of them.
+    // whether the rest of the way would take more than `hopeless` times as many as the last half of them, or is far
+    // more than all that is to come if each doubling passes as much less than the one before as it did three times.
     bool stands_still(const TrajectoryResult& result) {
         if (result.chain_steps < next_look_) return false;
         const double end = time_after(request_, request_.steps), passed = std::fabs(row_[0] - time_looked_),
-                     left = std::fabs(end - row_[0]);
-        const bool slows_down = next_look_ > first_look && passed < std::fabs(row_[0] - request_.time) / 4;
+                     left = std::fabs(end - row_[0]), ratio = passed / std::exchange(passed_before_, passed);
+        shrunk_ = ratio < shrinks ? shrunk_ + 1 : 0;
+        const bool slows_down = next_look_ > long_run && passed < std::fabs(row_[0] - request_.time) / 4,
+                   comes_to_an_end = shrunk_ >= 3 && left > far * passed * ratio / (1 - ratio);
         time_looked_ = row_[0];
         next_look_ = 2 * result.chain_steps;
-        return slows_down && left > hopeless * passed;
+        return comes_to_an_end || (slows_down && left > hopeless * passed);
     }
 
     const TrajectoryRequest& request_;
     std::vector<double> row_;  // t, q, p, of kernels with a clock in double; else empty
     std::int64_t next_look_ = first_look;
-    double time_looked_ = 0;
+    double time_looked_ = 0, passed_before_ = 0;
+    int shrunk_ = 0;
 };
 
 }  // namespace

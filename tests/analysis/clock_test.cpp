@@ -371,6 +371,8 @@ TEST_CASE("a motion that rounding or the step would throw back where the clock i
         {LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet", "--every", "1.5"});
     CHECK(rarely.exit_code == 3);
     CHECK_MESSAGE(rarely.err.find("after t = 1.5707") != std::string::npos, rarely.err);
+    // Slower than with x^2: time passes like the cubic root of 1 over the steps.
+    CHECK(test::contains(finished("x^4", 0.1).err, "time stands still"));
     // Clocks that become small, and stay above 0.
     for (const std::string clock : {"x^2 + 1e-6", "x + 1.001"}) {
         INFO(clock);

@@ -531,6 +531,7 @@ TEST_CASE("what is wrong with a wall is said with its place") {
     CHECK(test::contains(wall("a = { restitution = 1 }"), "when = \"y = 0 falling\""));
     CHECK(test::contains(wall("\"a[i]\" = { when = \"y = 0 falling\" }"), "how many impacts a[i] are there?"));
     CHECK(test::contains(wall("a = { when = \"y = 0 falling\", reset = { z = 1 } }"), "there is no coordinate 'z'"));
+    CHECK(test::contains(wall("a = { when = \"y = 0 falling\", reset = {} }"), "this reset changes nothing"));
     CHECK(test::contains(wall("y = { when = \"y = 0 falling\" }"), "y"));
     CHECK(test::contains(refusal("lagrangian = \"y'^4 + y'^2 - y\"\n[coordinates]\ny = { position = 1, velocity = 1 }\n"
                                  "[impacts]\na = { when = \"y = 0 falling\" }\n" +
