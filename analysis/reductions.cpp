@@ -4,8 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-
-#include "generator/mechanics/clock/clock.hpp"
+#include <cmath>
 
 namespace lobatto {
 
@@ -45,30 +44,68 @@ std::vector<GiNaC::symbol> variables_of(const Scene& scene) {
 
 }  // namespace
 
-void ClockedMean::observe(double time, double value, double rate, bool is_step) {
-    if (last_.is_step) {
-        if (step_.is_step) {
-            sum_ += (step_.value * step_.rate + last_.value * last_.rate) / 2;
-            weight_ += (step_.rate + last_.rate) / 2;
-        }
-        step_ = last_;
+void ClockedMean::begin(double step) {
+    *this = {};
+    step_ = step;
+}
+
+void ClockedMean::go_to(const Point& end) {
+    sum_ += (end_->value * end_->rate + end.value * end.rate) / 2;
+    weight_ += (end_->rate + end.rate) / 2;
+    end_ = end;
+}
+
+// Of the states since then some that are asked for may be ends of steps, too: those that are nearest to them. If the
+// last one is no end, it stays.
+void ClockedMean::pass_steps(bool last_is_end) {
+    const Point begin = *end_;
+    const auto way_to = [&](std::size_t i) { return way(i == 0 ? begin : since_[i - 1], since_[i]); };
+    double whole = 0, gone = 0;
+    for (std::size_t i = 0; i < since_.size(); ++i) whole += way_to(i);
+    const auto steps = std::max(1L, std::lround(whole / step_));
+    const double length = last_is_end ? whole / static_cast<double>(steps) : step_;
+    std::size_t passed = 0;
+    long ended = 1;
+    for (std::size_t i = 0; i + 1 < since_.size() && ended < steps; ++i) {
+        gone += way_to(i);
+        const double end = static_cast<double>(ended) * length;
+        if (std::fabs(gone - end) > std::fabs(gone + way_to(i + 1) - end)) continue;
+        go_to(since_[i]);
+        passed = i + 1;
+        ++ended;
     }
-    if (!begin_) begin_ = time;
-    last_ = {time, value, rate, is_step};
+    if (last_is_end) go_to(since_.back());
+    since_.erase(since_.begin(), last_is_end ? since_.end() : since_.begin() + static_cast<std::ptrdiff_t>(passed));
+}
+
+void ClockedMean::observe(double time, double value, double rate, bool is_asked) {
+    if (!first_) {
+        first_ = end_ = Point{time, value, rate};
+        return;
+    }
+    if (!last_is_asked_) pass_steps(true);
+    since_.push_back({time, value, rate});
+    last_is_asked_ = is_asked;
 }
 
 double ClockedMean::result() const {
-    if (!step_.is_step) return last_.value;
-    const double whole = step_.time - *begin_, rest = last_.time - step_.time,
-                 of_rest = (step_.value * step_.rate + last_.value * last_.rate) / (step_.rate + last_.rate);
-    return (weight_ > 0 ? sum_ / weight_ * whole + of_rest * rest : of_rest * rest) / (whole + rest);
+    if (!first_ || since_.empty()) return first_ ? first_->value : KeptNumber::none;
+    ClockedMean all = *this;
+    all.pass_steps(false);
+    const Point &end = *all.end_, &last = all.since_.back();
+    const double whole = end.time - first_->time, rest = last.time - end.time,
+                 of_rest = (end.value * end.rate + last.value * last.rate) / (end.rate + last.rate);
+    return ((all.weight_ > 0 ? all.sum_ / all.weight_ * whole : 0) + of_rest * rest) / (whole + rest);
 }
 
-Reductions::Reductions(const Scene& scene, const Arrivals& arrivals)
-    : n_(scene.coordinates.size()), parameters_(scene.parameters.size()), arrivals_(arrivals) {
+Reductions::Reductions(const Scene& scene, const ClockedSteps& clocked)
+    : n_(scene.coordinates.size()),
+      parameters_(scene.parameters.size()),
+      arrivals_(clocked.arrivals),
+      step_(clocked.step) {
     const std::vector<GiNaC::symbol> variables = variables_of(scene);
     variables_.resize(variables.size());
-    if (scene.clock) rate_ = Tape::of(clock_rate(scene), variables);
+    if (step_ != 0) rate_ = Tape::of(clocked.rate, variables);
     for (const Reduction& kept : scene.outputs.kept) {
         Part part{kept_of(kept.of), kept.event, std::nullopt};
         if (part.of != Kept::first && part.of != Kept::count) {
@@ -89,7 +126,7 @@ void Reductions::begin(const LoadedStepper<double>& stepper, const EnsembleStart
     has_begun_ = false;
     for (Part& part : parts_) {
         part.number.begin(part.of);
-        part.mean = {};
+        part.mean.begin(step_);
     }
     arrived_ = 0;
 }
@@ -110,12 +147,12 @@ void Reductions::observe(const double* rows, std::int64_t count) {
         at = std::copy(p_.begin(), p_.end(), at);
         *at = energy;
         if (!has_begun_) first_time_ = row[0];
-        const bool is_step = !is_arrival(row[0]) || !has_begun_;
+        const bool is_asked = is_arrival(row[0]);
         for (Part& part : parts_) {
             if (!part.formula) continue;
             const double value = (*part.formula)(variables_);
             part.number.observe(part.of, value, row[0] - last_time_, !has_begun_);
-            if (rate_ && part.of == Kept::mean) part.mean.observe(row[0], value, (*rate_)(variables_), is_step);
+            if (rate_ && part.of == Kept::mean) part.mean.observe(row[0], value, (*rate_)(variables_), is_asked);
         }
         last_time_ = row[0];
         has_begun_ = true;

@@ -21,25 +21,41 @@ namespace lobatto {
 // trapezoidal rule there, for f g, is as good as the steps are over whole periods; in t it is not, with few steps.
 class ClockedMean {
 public:
-    // At the next state; `is_step`: at the end of a step, not one that is asked for between two.
-    void observe(double time, double value, double rate, bool is_step);
+    // Steps of this length in tau.
+    void begin(double step);
+    // At the next state; `is_asked`: it is asked for at its time. That it is the end of a step, too, is seen by the way
+    // to the end of the next one.
+    void observe(double time, double value, double rate, bool is_asked);
     double result() const;
 
 private:
     struct Point {
         double time = 0, value = 0, rate = 0;
-        bool is_step = false;
     };
-    std::optional<double> begin_;
-    Point step_, last_;  // at the last step that others follow, and of all
+    static double way(const Point& from, const Point& to) {  // in tau, about
+        return 2 * (to.time - from.time) / (from.rate + to.rate);
+    }
+    void go_to(const Point& end);
+    void pass_steps(bool last_is_end);
+
+    double step_ = 0;
+    std::optional<Point> first_, end_;  // the start, and the last end of a step that others follow
+    std::vector<Point> since_;          // states after that; the last may be the end of a step
+    bool last_is_asked_ = true;
     double sum_ = 0, weight_ = 0;
+};
+
+// With a clock: the times at which states are asked for, its rate in the scene that the kernel is of, and its steps.
+struct ClockedSteps {
+    Arrivals arrivals;
+    GiNaC::ex rate;
+    double step = 0;
 };
 
 class Reductions : public Reducer {
 public:
-    // `arrivals`: of the trajectories, with a clock. InputError for a formula that cannot be evaluated. The scene
-    // outlives it.
-    explicit Reductions(const Scene& scene, const Arrivals& arrivals = {});
+    // InputError for a formula that cannot be evaluated. The scene outlives it.
+    explicit Reductions(const Scene& scene, const ClockedSteps& clocked = {});
 
     void begin(const LoadedStepper<double>& stepper, const EnsembleStart& start) override;
     void observe(const double* rows, std::int64_t count) override;
@@ -71,6 +87,7 @@ private:
     bool has_begun_ = false;
     std::optional<Tape> rate_;  // of the clock
     Arrivals arrivals_;
+    double step_ = 0;
     std::int64_t arrived_ = 0;
 };
 

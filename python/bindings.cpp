@@ -106,7 +106,8 @@ bool advance(lob::Stepper& stepper, std::int64_t steps) {
 // A step, or with a clock the way to the next of the scene's times, tells how long the others are.
 bool advance_to(lob::Stepper& stepper, double t) {
     constexpr double few = 256;
-    if (t - stepper.t() > few * (stepper.next_time() - stepper.t())) {
+    const double about = (t - stepper.t()) / (stepper.next_time() - stepper.t());
+    if (about > few && about < 9e15) {
         if (!unlocked([&] { return stepper.advance(1); })) return false;
         const double now = stepper.t(), length = stepper.next_time() - now;
         const double rounding = 4 * std::numeric_limits<double>::epsilon() * std::fmax(std::fabs(t), 1) / length;

@@ -97,6 +97,16 @@ void StepJudge::restore(const std::vector<double>& saved) {
     }
 }
 
+// Which coordinates errors alone move (rests_beside).
+std::vector<bool> StepJudge::resting(LoadedStepper<double>& stepper, const TrajectoryRequest& request,
+                                     const std::vector<double>& sizes) const {
+    Rows rows{{request.time}};
+    rows[0].insert(rows[0].end(), request.q.begin(), request.q.end());
+    rows[0].insert(rows[0].end(), request.p.begin(), request.p.end());
+    for (const auto& [place, state] : some_) rows.push_back(state.row);
+    return rests_beside(stepper, request.step, rows, sizes, slight(sizes));
+}
+
 StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request,
                                       const TrajectoryResult& result) const {
     Judgement judgement;
@@ -149,11 +159,10 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
     const double least = outline.scene.constraints.empty() ? 1 : std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < 2 * n; ++i)
         if (measure[i] < levels[i]) measure[i] = least * levels[i];
-    const std::vector<bool> is_slight =
-        slight_from_rest(sizes, first_step_of(stepper, request.time, request.q, request.p, request.step));
+    const std::vector<bool> rests = resting(stepper, request, sizes);
     for (std::size_t k = 0; k < n; ++k)
         for (const std::size_t i : {k, n + k})
-            if (!moves[k] || !moves[i] || is_slight[k]) measure[i] = std::numeric_limits<double>::infinity();
+            if (!moves[k] || !moves[i] || rests[k]) measure[i] = std::numeric_limits<double>::infinity();
     const std::optional<double> unresolved = first_unresolved(stepper, hardest_.states(), request.every, result.time,
                                                               request.parameters, request.step, measure);
     if (unresolved) judgement.unresolved = {1 + std::llround((*unresolved - request.time) / request.step), *unresolved};

@@ -53,6 +53,8 @@ private:
     HardestSteps hardest_;
     std::int64_t seen_ = 0;
     void keep(std::int64_t number, std::vector<double> row);
+    std::vector<bool> resting(LoadedStepper<double>& stepper, const TrajectoryRequest& request,
+                              const std::vector<double>& sizes) const;
 };
 
 }  // namespace lobatto

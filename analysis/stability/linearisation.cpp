@@ -355,7 +355,7 @@ std::optional<Linearisation::Position> Linearisation::equilibrium_from(const Vec
     };
     try {
         Position q = exactly(start);
-        VectorXd last = VectorXd::Zero(start.size());
+        VectorXd last = VectorXd::Zero(start.size()), direction = last;
         double last_ratio = 0;
         for (int iteration = 0; iteration < 200 && !rests(q); ++iteration) {
             const VectorXd f = plain_force(q);
@@ -366,7 +366,7 @@ std::optional<Linearisation::Position> Linearisation::equilibrium_from(const Vec
             if (limit > 1) step /= limit;
             // Towards a multiple root the steps shrink by one ratio: all that remain at once.
             const double ratio = last.isZero(0) ? 0 : step.dot(last) / last.squaredNorm();
-            last = step;
+            last = direction = step;
             if (limit <= 1 && ratio > 0.4 && ratio < 0.95 && std::fabs(ratio - last_ratio) < 0.01) {
                 step /= 1 - ratio;
                 last.setZero();
@@ -382,8 +382,14 @@ std::optional<Linearisation::Position> Linearisation::equilibrium_from(const Vec
         Position rounded = q;
         for (std::size_t k = 0; k < q.size(); ++k)
             if (std::fabs(cln::double_approx(q[k])) <= 1e-12 * extent(static_cast<Eigen::Index>(k))) rounded[k] = 0;
+        // A multiple root lies between larger forces, a place where they fade does not.
+        const auto lies_between = [&](const Position& place) {
+            const VectorXd aside = direction.normalized().cwiseProduct(1e-3 * extent);
+            const double here = plain_force(place).norm();
+            return plain_force(moved(place, aside)).norm() > here && plain_force(moved(place, -aside)).norm() > here;
+        };
         for (const Position& place : {rounded, q})
-            if (rests(place) && (is_multiple || !fades(place))) return place;
+            if (rests(place) && ((is_multiple && lies_between(place)) || !fades(place))) return place;
     } catch (const DomainError&) {
     }
     return std::nullopt;

@@ -14,6 +14,7 @@
 #include "analysis/kernel/device_kernel.hpp"
 #include "analysis/reductions.hpp"
 #include "analysis/sweep/pace.hpp"
+#include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/start.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/output.hpp"
@@ -241,10 +242,14 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
                               scene.clock.has_value());
     request.threads = options_.threads;
     request.stops = !scene.run.stops.empty();
-    if (!scene.outputs.kept.empty())  // threads copy it: formulas are not for several at once
-        request.reducer = [reductions = std::make_shared<const Reductions>(scene, request.arrivals)] {
+    if (!scene.outputs.kept.empty()) {  // threads copy it: formulas are not for several at once
+        ClockedSteps clocked;
+        if (scene.clock)
+            clocked = {request.arrivals, clock_rate(starts_->with_settings(as_written_, request.first)), request.step};
+        request.reducer = [reductions = std::make_shared<const Reductions>(scene, clocked)] {
             return std::make_unique<Reductions>(*reductions);
         };
+    }
     return request;
 }
 

@@ -54,12 +54,12 @@ TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const
         scene.clock ? ", clock = " + scene.clock->text : "",
         scene.method.numbers == Precision::double_ ? "" : ", in " + precision_name(scene.method.numbers));
     header.kernel = source.digest;
-    for (std::size_t i = 0; i < scene.parameters.size(); ++i)
-        header.parameters.emplace_back(
-            scene.parameters[i].name,
-            decimal_text(
-                whole ? request.whole_parameters.data() + i * static_cast<std::size_t>(parts) : &request.parameters[i],
-                parts));
+    for (std::size_t i = 0; i < scene.parameters.size(); ++i) {
+        if (scene.parameters[i].is_side) continue;
+        const double* const value =
+            whole ? request.whole_parameters.data() + i * static_cast<std::size_t>(parts) : &request.parameters[i];
+        header.parameters.emplace_back(scene.parameters[i].name, decimal_text(value, parts));
+    }
     header.columns = {{"t", ""}};
     for (const Coordinate& coordinate : scene.coordinates)
         header.columns.emplace_back(coordinate.name, coordinate.unit);

@@ -75,7 +75,7 @@ TableHead head_of(const SweepStudy& study) {
     starts.start(0, start);
     std::vector<std::string> parameters, statuses;
     for (std::size_t i = 0; i < scene.parameters.size(); ++i)
-        if (!starts.varies(Role::parameter, i))
+        if (!starts.varies(Role::parameter, i) && !scene.parameters[i].is_side)
             parameters.push_back(fmt::format("{} = {}", scene.parameters[i].name, exact_text(start.parameters[i])));
     if (!parameters.empty()) head.add("parameters", fmt::format("{}", fmt::join(parameters, ", ")));
     for (const auto& [what, text] : starts.sources()) head.add(what, text);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A step that a kernel took, put into the discrete Euler-Lagrange equations that it was derived from.
 #include <algorithm>
-#include <array>
 #include <map>
 #include <string>
 
@@ -97,20 +96,21 @@ private:
     }
 
     // An iteration ends where all increments together are rounding, so an element of an array is as exact as the one
-    // that moves most.
+    // that moves most; its momentum as if it moved so far.
     void add_sizes_of_arrays(Numbers& position, Numbers& momentum0, Numbers& momentum1) {
-        std::map<std::string, std::array<cln::cl_R, 3>> largest;
+        std::map<std::string, cln::cl_R> farthest;
+        std::vector<GiNaC::ex> diagonal;
         for (std::size_t k = 0; k < n_; ++k) {
-            auto& [moved, p0, p1] = largest[arrays_[k]];
+            cln::cl_R& moved = farthest[arrays_[k]];
             moved = cln::max(moved, cln::abs(path_.back()[k] - path_.front()[k]));
-            p0 = cln::max(p0, cln::abs(step_.p0[k]));
-            p1 = cln::max(p1, cln::abs(step_.p1[k]));
+            diagonal.push_back(system_.momentum_v(static_cast<int>(k), static_cast<int>(k)));
         }
+        const Numbers mass = formulas_(diagonal);
         for (std::size_t k = 0; k < n_; ++k) {
-            const auto& [moved, p0, p1] = largest[arrays_[k]];
+            const cln::cl_R &moved = farthest[arrays_[k]], pushed = cln::abs(mass[k] * moved / h_);
             position[k] = cln::max(position[k], moved);
-            momentum0[k] = p0;
-            momentum1[k] = p1;
+            momentum0[k] = cln::max(cln::abs(momentum0[k]), pushed);
+            momentum1[k] = cln::max(cln::abs(momentum1[k]), pushed);
         }
     }
 

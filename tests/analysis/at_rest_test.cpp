@@ -117,7 +117,21 @@ TEST_CASE("a coordinate that rests, but for the error of steps, loses no motion"
                          scene.folder / "sweep.csv", "--quiet"})
                   .exit_code == 0);
     }
-    // Not so what is slight but begins to move: beyond the stability limit, one way or the other.
+    // Not so what a pulse moves, in time or in space, or an instability.
+    for (const char* text :
+         {"time = \"t\"\nlagrangian = \"(x'^2 + z'^2)/2 - 0.04*x^2/2 + 5e-4*z*exp(-((t - 7.5)/0.05)^2)\"\n"
+          "[coordinates]\nx = { position = 1, velocity = 0 }\nz = { position = 0, velocity = 0 }\n"
+          "[method]\npoints = 3\n[run]\nstep = 1\nuntil = 12\n",
+          "lagrangian = \"(x'^2 + z'^2)/2 - 0.02*(x^2 + z^2)/2 + 5e-4*z*exp(-((x - 0.428)/0.05)^2)\"\n"
+          "[coordinates]\nx = { position = 5, velocity = 0 }\nz = { position = 0, velocity = 0 }\n"
+          "[method]\npoints = 3\n[run]\nstep = 1\nuntil = 20\n",
+          "lagrangian = \"(x'^2 + z'^2)/2 - 0.04*x^2/2 + z^2/2\"\n[coordinates]\n"
+          "x = { position = 1, velocity = 0 }\nz = { position = 4e-9, velocity = 0 }\n"
+          "[method]\nfamily = \"gauss\"\nstages = 1\n[run]\nstep = 1\nuntil = 12\n"}) {
+        INFO(text);
+        CHECK(MeasuredScene(text).run().exit_code == 3);
+    }
+    // Nor what is slight but begins to move: beyond the stability limit, one way or the other.
     for (const char* start : {"velocity = 1e-6, position = 0", "velocity = 0, position = 1e-6"})
         CHECK(MeasuredScene(fmt::format("lagrangian = \"(x'^2 + y'^2)/2 - 1000*x^2/2 - y^2/2\"\n[coordinates]\n"
                                         "x = {{ {} }}\ny = {{ position = 0, velocity = 0.35 }}\n"

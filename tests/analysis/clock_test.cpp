@@ -291,6 +291,37 @@ TEST_CASE("means over a motion with a clock are those over the time") {
     }
 }
 
+TEST_CASE("means with a clock count steps that end where states are asked for, and the clock is that of the kernel") {
+    const test::TemporaryFolder folder;
+    const auto means = [&](const std::string& text, std::vector<std::string> options) {
+        test::write_text(folder / "scene.toml", text);
+        options.insert(options.begin(), {LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "points=8",
+                                         "--keep", "mean(y), mean(y^2)", "-o", folder / "sweep.csv"});
+        const test::Finished finished = test::run(options);
+        INFO(finished.err);
+        REQUIRE(finished.exit_code == 0);
+        return test::read_trajectory(folder / "sweep.csv").rows.at(0);  // index, points, status, steps, t, the means
+    };
+    // x rests, so that the clock is 1: each fourth step ends at a state that is asked for, or at none.
+    for (const char* every : {"0.5", "0.53"}) {
+        const auto row = means(
+            "lagrangian = \"(x'^2 + y'^2)/2 - (4*pi*y)^2/2\"\n[coordinates]\nx = { position = 0, velocity = 0 }\n"
+            "y = { position = 1, velocity = 0 }\n[method]\nclock = \"1 + x^2\"\n[run]\nstep = 0.125\nuntil = 8\n"
+            "[output]\nevery = " +
+                std::string(every) + "\n",
+            {});
+        CHECK(std::fabs(row[5]) < 1e-12);
+        CHECK(std::fabs(row[6] - 0.5) < 1e-12);
+    }
+    const std::string two =
+        "lagrangian = \"(x'^2 + y'^2)/2 + k/sqrt(x^2 + y^2) + 1/sqrt((x - 4)^2 + y^2)\"\n"
+        "[coordinates]\nx = { position = 3, velocity = 0 }\ny = { position = 0, velocity = 0.7 }\n"
+        "[parameters]\nk = 1\n[method]\nclock = \"auto\"\n[run]\nstep = 0.05\nuntil = 20\n";
+    const auto with_clock = means(two, {"--set", "k=-0.3"}),
+               without = means(two, {"--set", "k=-0.3", "--clock", "none", "--step", "0.002"});
+    CHECK(std::fabs(with_clock[6] - without[6]) < 1e-4);  // 0.25293; with the clock of k = -0.3 it would be 0.2489
+}
+
 TEST_CASE("a row of a sweep with a clock is the end of a run, for any number of threads") {
     const test::TemporaryFolder folder;
     test::write_text(folder / "scene.toml", kepler(0.5, "points = 8\nclock = \"r^(3/2)\"", "step = 0.6\nuntil = 50"));
@@ -440,6 +471,7 @@ TEST_CASE("an automatic clock follows the poles of the Lagrangian") {
     // Numerators that are 0 at the start, or become negative: r^-2 and r^-3 in their places.
     CHECK(std::fabs(clock_of("(x'^2 + y'^2)/2 + x*y/(x^2 + y^2)^2") - 16) < 1e-13);
     CHECK(std::fabs(clock_of("(x'^2 + y'^2)/2 - 3*cos(y)*(x^2 - y^2)/sqrt(x^2 + y^2)^5") - 32) < 1e-13);
+    CHECK(std::fabs(clock_of("(x'^2 + y'^2)/2 - (1 + x^2)/(x^2 + y^2)") - 16) < 1e-13);
     CHECK_THROWS_WITH_AS(clock_of("(x'^2 + y'^2)/2 - x^2/(x^2 + y^2)"), doctest::Contains("and there is none"),
                          InputError);
     CHECK_THROWS_WITH_AS(clock_of("(x'^2 + y'^2)/2 - x^2/2"), doctest::Contains("and there is none; write a formula"),
@@ -459,7 +491,8 @@ TEST_CASE("what has no clock says so") {
           "clock.toml:10:9: the clock is -0.5 at the start; it must be positive wherever the motion goes");
     for (const char* pole : {"1/y", "log(y)", "1/(x - 1)"})
         CHECK(refusal(kepler(0, fmt::format("clock = \"{}\"", pole), "step = 0.1\nuntil = 1")) ==
-              "clock.toml:10:9: the clock, or the Lagrangian, has no finite real value at the start");
+              "clock.toml:10:9: the clock, or the Lagrangian, has no finite real value at the start; "
+              "start elsewhere, or mend the formula");
     CHECK(refusal(kepler(0.5, "clock = \"r\"", "step = 0.1\nuntil = 1\n[forces]\nx = \"-x'\"")) ==
           "clock.toml:10:9: a clock needs a motion that keeps its energy, but a force acts on x; remove the clock, or "
           "the "

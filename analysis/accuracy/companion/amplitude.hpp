@@ -25,6 +25,9 @@ double beside(double start);
 // Coordinates whose errors are measured by one amplitude have the same number: those of an array.
 std::vector<int> amplitude_groups(const Scene& scene);
 
+// The coordinates that stand in the formulas of walls.
+std::vector<bool> held_by_walls(const Scene& scene);
+
 // Takes a row of `count` numbers into a range.
 void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count);
 
@@ -58,24 +61,33 @@ void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons
                         double steps, double epsilon, const FirstMoves& first,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
 
-// How far each number would go in the first step at the pace of the start, q then p. Empty where that is refused.
-// `stepper` is prepared.
-std::vector<double> first_step_of(LoadedStepper<double>& stepper, double time, const std::vector<double>& q,
-                                  const std::vector<double>& p, double step);
+// States of a run, t, q, p, the first at its start; where there is no kernel in double there are none.
+using Rows = std::vector<std::vector<double>>;
 
-// Between walls a body may be at one place after each step, of the run and of the companion. A position moves by a part
-// of what it would go in the first step, at least.
-void widen_by_pace(std::vector<double>& amplitudes, const std::vector<double>& first_step);
+// How far each number would go in a step at the pace of a state, q then p. Empty where the state is refused. `stepper`
+// is prepared.
+std::vector<double> pace_at(LoadedStepper<double>& stepper, double step, const std::vector<double>& row);
 
-// Which coordinates begin at rest, without a force, and stay slight beside the others. The error of steps may be all
-// that moves them. `amplitudes`: q, p; `first_step`: as above.
-std::vector<bool> slight_from_rest(const std::vector<double>& amplitudes, const std::vector<double>& first_step);
+// Between walls a body may be at one place after each step, of the run and of the companion. Where a position of these,
+// `meets_wall`, goes nowhere and has a velocity, its amplitude becomes a part of what it goes in a step. `pace`: at the
+// start.
+void widen_by_pace(std::vector<double>& amplitudes, const std::vector<bool>& meets_wall,
+                   const std::vector<double>& pace);
 
-// Of these the amplitudes become 0 if those of the run are larger than those of the companion, whose steps are shorter:
-// then they are errors of steps. `first_step` is asked where there is one that may be.
+// Which coordinates stay slight beside the others.
+std::vector<bool> slight(const std::vector<double>& amplitudes);
+
+// Which coordinates begin at rest, without a force, and would stay there wherever the others are: errors alone move
+// them. Of `asked` only.
+std::vector<bool> rests_beside(LoadedStepper<double>& stepper, double step, const Rows& rows,
+                               const std::vector<double>& amplitudes, const std::vector<bool>& asked);
+
+// The amplitudes of slight coordinates become 0 if they rest, and those of the run are larger than those of the
+// companion, whose steps are shorter: then they are errors of steps. `rests`: rests_beside, where there is one that
+// may.
 void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& of_run,
                                const std::vector<double>& of_companion,
-                               const std::function<std::vector<double>()>& first_step);
+                               const std::function<std::vector<bool>(const std::vector<bool>& asked)>& rests);
 
 // What the rounding of numbers in a range is measured by: the largest size of each, or what constraints make of it
 // (constraint_sizes.hpp; empty: there are none).

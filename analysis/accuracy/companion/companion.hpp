@@ -104,6 +104,9 @@ private:
     bool needs_parts(double from, double step) const { return is_near_pulse(from, step) || knot_within(from, step); }
     // 2n, of the motion until so many comparisons; 0: of what does not move, or by rounding alone.
     std::vector<double> amplitudes(std::size_t comparisons) const;
+    std::vector<double> row_at(std::size_t comparison) const;
+    void look_at_paces(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& of_run,
+                       const std::vector<double>& of_companion) const;
     MeasuredError compare(const TrajectoryResult& result) const;
 
     Kernel kernel_;
@@ -112,6 +115,7 @@ private:
     bool is_finer_;       // than those
     TrajectoryRequest request_;
     std::vector<int> groups_;
+    std::vector<bool> meets_wall_;  // n
     int rows_a_step_;
     std::vector<Pulse> pulses_;    // which the steps of the run may miss: the companion's are fine there
     NarrowTerms narrow_;           // likewise, where the motion meets them

@@ -64,6 +64,35 @@ void lose(MeasuredError& error, double time, const std::vector<double>& row) {
 
 }  // namespace
 
+// t, q, p of the run: 0 its start, then its comparisons.
+std::vector<double> Companion::row_at(std::size_t comparison) const {
+    std::vector<double> row{request_.time};
+    if (comparison == 0) {
+        row.insert(row.end(), request_.q.begin(), request_.q.end());
+        row.insert(row.end(), request_.p.begin(), request_.p.end());
+    } else {
+        row[0] = time_after(request_, run_[comparison - 1].steps);
+        const std::vector<double> state = rounded(run_[comparison - 1].row, parts_);
+        row.insert(row.end(), state.begin(), state.end());
+    }
+    return row;
+}
+
+// Of a kernel in double: what velocities and forces tell of amplitudes.
+void Companion::look_at_paces(std::vector<double>& amplitudes, std::size_t comparisons,
+                              const std::vector<double>& of_run, const std::vector<double>& of_companion) const {
+    LoadedStepper<double> stepper(kernel_);
+    if (stepper.prepare(request_.whole_parameters, request_.step) != LOBATTO_OK) return;
+    if (kernel_->impacts > 0) widen_by_pace(amplitudes, meets_wall_, pace_at(stepper, request_.step, row_at(0)));
+    const bool is_smooth = pulses_.empty() && knots_.empty() && !contacts_.is_sought();
+    if (!is_smooth || comparisons == 0) return;
+    leave_out_errors_of_steps(amplitudes, of_run, of_companion, [&](const std::vector<bool>& asked) {
+        Rows rows;
+        for (std::size_t j = 0; j <= comparisons; ++j) rows.push_back(row_at(j));
+        return rests_beside(stepper, request_.step, rows, amplitudes, asked);
+    });
+}
+
 std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     const std::size_t n = groups_.size();
     Range all = range_, of_companion;
@@ -99,17 +128,9 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     std::vector<double> start = rounded(request_.whole_q, parts_), momenta = rounded(request_.whole_p, parts_);
     start.insert(start.end(), momenta.begin(), momenta.end());
     leave_out_noise(shared, comparisons, start, pair);
-    const auto first_step = [this] {
-        if (kernel_->real_kind != LOBATTO_DOUBLE) return std::vector<double>();
-        LoadedStepper<double> at_start(kernel_);
-        return at_start.prepare(request_.whole_parameters, request_.step) == LOBATTO_OK
-                   ? first_step_of(at_start, request_.time, request_.q, request_.p, request_.step)
-                   : std::vector<double>();
-    };
-    if (kernel_->impacts > 0) widen_by_pace(shared, first_step());
-    if (comparisons > 0)
-        leave_out_errors_of_steps(shared, half_of(range_.least, range_.most),
-                                  half_of(of_companion.least, of_companion.most), first_step);
+    if (kernel_->real_kind == LOBATTO_DOUBLE)
+        look_at_paces(shared, comparisons, half_of(range_.least, range_.most),
+                      half_of(of_companion.least, of_companion.most));
     if (comparisons == 0) return shared;
     const Range& until_first = companion_ranges_.front();
     leave_out_rounding(shared, comparisons, places, static_cast<double>(request_.steps), run_epsilon_,

@@ -53,6 +53,7 @@ EnsembleCompanion::EnsembleCompanion(const Outline& outline, const Kernel& kerne
       parts_(static_cast<std::size_t>(kernel->parts)),
       request_(request),
       groups_(amplitude_groups(outline.scene)),
+      meets_wall_(held_by_walls(outline.scene)),
       narrow_(outline.system),
       constraints_(outline.system),
       stepper_(plain) {}
@@ -225,15 +226,19 @@ std::vector<double> EnsembleCompanion::amplitudes(
     const std::vector<double> places = places_of(least, most, by_constraints);
     std::vector<double> amplitude = amplitudes_of(least, most, places, groups_, kernel_->epsilon);
     leave_out_noise(amplitude, static_cast<std::size_t>(comparisons), {kept.rows + 1, kept.rows + kept.columns}, pair);
-    const auto first_step = [&] {
-        const double* const row = kept.rows + 1;
-        return stepper_.prepare(parameters, request_.step) == LOBATTO_OK
-                   ? first_step_of(stepper_, request_.time, {row, row + n}, {row + n, row + 2 * n}, request_.step)
-                   : std::vector<double>();
+    const auto row_at = [&](std::int64_t i) {
+        return std::vector<double>(kept.rows + i * kept.columns, kept.rows + (i + 1) * kept.columns);
     };
-    if (kernel_->impacts > 0) widen_by_pace(amplitude, first_step());
+    if (kernel_->impacts > 0 && stepper_.prepare(parameters, request_.step) == LOBATTO_OK)
+        widen_by_pace(amplitude, meets_wall_, pace_at(stepper_, request_.step, row_at(0)));
     if (comparisons == 0) return amplitude;
-    leave_out_errors_of_steps(amplitude, run_half, half_of(of_companion[0], of_companion[1]), first_step);
+    leave_out_errors_of_steps(
+        amplitude, run_half, half_of(of_companion[0], of_companion[1]), [&](const std::vector<bool>& asked) {
+            Rows rows;
+            if (!outline_.scene.is_cut() && stepper_.prepare(parameters, request_.step) == LOBATTO_OK)
+                for (std::int64_t i = 0; i < kept.count; ++i) rows.push_back(row_at(i));
+            return rests_beside(stepper_, request_.step, rows, amplitude, asked);
+        });
     const auto first = known.ranges.begin(), middle = first + std::ssize(amplitude);
     leave_out_rounding(
         amplitude, static_cast<std::size_t>(comparisons), places, static_cast<double>(request_.steps), kernel_->epsilon,

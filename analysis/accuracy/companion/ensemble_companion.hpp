@@ -59,6 +59,7 @@ private:
     std::size_t parts_;
     const EnsembleRequest& request_;
     std::vector<int> groups_;
+    std::vector<bool> meets_wall_;          // n
     std::vector<double> pulse_parameters_;  // those that were asked for last
     bool has_pulses_ = false;               // with these
     NarrowTerms narrow_;

@@ -17,13 +17,22 @@ bool holds(const ex& expression, const Symbols& symbols) {
     return std::any_of(symbols.begin(), symbols.end(), [&](const GiNaC::symbol& s) { return expression.has(s); });
 }
 
-// The degree of a polynomial in the positions, all of them together, `least` at least; that of what is none.
-GiNaC::numeric degree_of(const ex& base, const Symbols& positions, int least) {
+// The degree of a polynomial in the positions, all of them together; 1 for what is none.
+GiNaC::numeric degree_of(const ex& base, const Symbols& positions) {
     const GiNaC::symbol scale("scale");
     GiNaC::exmap scaled;
     for (const GiNaC::symbol& q : positions) scaled[q] = scale * q;
     const ex whole = base.subs(scaled, GiNaC::subs_options::no_pattern).expand();
-    return whole.is_polynomial(scale) ? std::max(whole.degree(scale), least) : least;
+    return whole.is_polynomial(scale) ? std::max(whole.degree(scale), 1) : 1;
+}
+
+// Of a factor that holds positions: its least degree, or 0.
+GiNaC::numeric least_degree_of(const ex& factor, const Symbols& positions) {
+    const GiNaC::symbol scale("scale");
+    GiNaC::exmap scaled;
+    for (const GiNaC::symbol& q : positions) scaled[q] = scale * q;
+    const ex whole = factor.subs(scaled, GiNaC::subs_options::no_pattern).expand();
+    return whole.is_polynomial(scale) ? whole.ldegree(scale) : 0;
 }
 
 struct Pole {
@@ -43,10 +52,10 @@ std::optional<Pole> pole_of(const ex& term, const Symbols& positions) {
             constant *= factor;
         } else if (exponent.is_negative()) {
             denominator *= factor;
-            largest = std::max(largest, -exponent * degree_of(factor.op(0), positions, 1));
+            largest = std::max(largest, -exponent * degree_of(factor.op(0), positions));
         } else {
             numerator *= factor;
-            above += degree_of(factor, positions, 0);
+            above += exponent * least_degree_of(is_power ? factor.op(0) : factor, positions);
         }
     };
     if (GiNaC::is_a<GiNaC::mul>(term))

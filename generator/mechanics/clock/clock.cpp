@@ -141,7 +141,9 @@ Scene in_clock_time(const Scene& scene) {
     try {
         return Transformation(scene).transform();
     } catch (const std::domain_error&) {
-        fail_at_clock(scene, "the clock, or the Lagrangian, has no finite real value at the start");
+        fail_at_clock(scene,
+                      "the clock, or the Lagrangian, has no finite real value at the start; start "
+                      "elsewhere, or mend the formula");
     }
 }
 

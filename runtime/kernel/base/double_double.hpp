@@ -7,8 +7,8 @@
 // overflows is infinite or not a number, and stays so.
 #ifndef LOBATTO_KERNEL_DOUBLE_DOUBLE_HPP
 #define LOBATTO_KERNEL_DOUBLE_DOUBLE_HPP
-#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ + 0 == 2
-#error "double-double needs sums that are rounded to double: compile without -mfpmath=387"
+#if defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ == 2 || __FLT_EVAL_METHOD__ < 0)
+#error "double-double needs sums that are rounded to double: compile without -mfpmath=387 and -mfpmath=both"
 #endif
 
 #include <type_traits>

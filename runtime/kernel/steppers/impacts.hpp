@@ -55,9 +55,10 @@ struct Walls {
     static real side(S& stepper, int w) {
         return w < impacts ? real(-K::event_direction[first + w]) : stepper.side(w - impacts);
     }
-    bool is_behind() const {  // of impacts
+    bool is_behind(int w) const { return value[first + w] * real(-K::event_direction[first + w]) < -slack[w]; }
+    bool is_behind() const {  // of one of the impacts
         for (int w = 0; w < impacts; ++w)
-            if (value[first + w] * real(-K::event_direction[first + w]) < -slack[w]) return true;
+            if (is_behind(w)) return true;
         return false;
     }
     bool is_met(int w) const { return fabs(value[first + w]) <= slack[w] && approach[w] < real(0); }
@@ -79,18 +80,25 @@ struct Walls {
         return look(stepper, time, q, p);
     }
 
-    // What a rounding of the largest coordinate does to each g, over epsilon. The metric of the kinetic energy makes
-    // one unit of all: g grows by sqrt(dq M dq) sqrt(dg/dq M^-1 dg/dq) at most.
-    void scale_by_whole_motion(S& stepper) {
+    // A motion may leave a body behind a wall by what a rounding of the largest coordinate does to g. Such a depth is
+    // zero from then on. The metric of the kinetic energy makes one unit of all coordinates: g grows by sqrt(dq M dq)
+    // sqrt(dg/dq M^-1 dg/dq) at most; where masses are far apart that is too much, and |dg/dq| |dq| counts.
+    void forgive_rounding(S& stepper) {
         const real h = stepper.step_size;
-        real still[n] = {}, rest[n], moved[n], size = real(0), change[n], mobility;
+        real still[n] = {}, rest[n], moved[n], size = real(0), farthest = real(0), change[n], mobility;
         stepper.momentum(time, q, still, rest);
         stepper.momentum(time, q, q, moved);
-        for (int c = 0; c < n; ++c) size += q[c] * (moved[c] - rest[c]) + h * h * velocity[c] * (p[c] - rest[c]);
+        for (int c = 0; c < n; ++c) {
+            size += q[c] * (moved[c] - rest[c]) + h * h * velocity[c] * (p[c] - rest[c]);
+            for (const real far : {fabs(q[c]), fabs(h * velocity[c])}) farthest = far > farthest ? far : farthest;
+        }
         for (int w = 0; w < impacts; ++w) {
-            if (push(stepper, w, change, mobility) != Status::ok) continue;
-            const real scale = sqrt(size * mobility);
-            if (scale > stepper.wall_scale[w] && is_finite(scale)) stepper.wall_scale[w] = scale;
+            const real depth = fabs(value[first + w]);
+            if (!is_behind(w) || push(stepper, w, change, mobility) != Status::ok) continue;
+            real slope = real(0);
+            for (int c = 0; c < n; ++c) slope += fabs(gradient[w * n + c]);
+            if (depth <= few * sqrt(size * mobility) && depth <= few * slope * farthest)
+                stepper.wall_scale[w] = (real(1) + few) * depth / few;
         }
     }
 
@@ -172,7 +180,7 @@ struct Sides {
         if constexpr (switches_of<K>() > 0) scale_switches(stepper, time, q, p);
         Status status = wall.look(stepper, time, q, p);
         if (status == Status::ok && wall.is_behind()) {
-            wall.scale_by_whole_motion(stepper);
+            wall.forgive_rounding(stepper);
             status = wall.look(stepper, time, q, p);
             if (status == Status::ok && wall.is_behind()) return Status::off_constraints;
         }
