@@ -256,7 +256,7 @@ void SystemReader::read_kept(const std::vector<std::string>& given) {
         for (int column = 1; std::ssize(text.at) <= std::ssize(option); ++column) text.at.push_back({1, column});
         for (const Text& piece : pieces_of(text)) read_kept(source, piece);
     }
-    if (!given.empty()) return;
+    if (entry == nullptr || !given.empty()) return;
     if (entry->value.kind != Value::Kind::list)
         fail(entry->value.at, fmt::format("keep must be a list such as [\"first(x = 0)\", \"max(x)\"], not {}",
                                           entry->value.kind_name()));
