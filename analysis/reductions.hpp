@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/clocked_mean.hpp"
 #include "analysis/tape.hpp"
 #include "generator/scene/scene.hpp"
 #include "runtime/kernel/kept.hpp"
@@ -17,39 +18,13 @@
 
 namespace lobatto {
 
-// The mean over time of a formula f along a motion with a clock, dt = g dtau. Its steps are equally long in tau, so the
-// trapezoidal rule there, for f g, is as good as the steps are over whole periods; in t it is not, with few steps.
-class ClockedMean {
-public:
-    // Steps of this length in tau.
-    void begin(double step);
-    // At the next state; `is_asked`: it is asked for at its time. That it is the end of a step, too, is seen by the way
-    // to the end of the next one.
-    void observe(double time, double value, double rate, bool is_asked);
-    double result() const;
-
-private:
-    struct Point {
-        double time = 0, value = 0, rate = 0;
-    };
-    static double way(const Point& from, const Point& to) {  // in tau, about
-        return 2 * (to.time - from.time) / (from.rate + to.rate);
-    }
-    void go_to(const Point& end);
-    void pass_steps(bool last_is_end);
-
-    double step_ = 0;
-    std::optional<Point> first_, end_;  // the start, and the last end of a step that others follow
-    std::vector<Point> since_;          // states after that; the last may be the end of a step
-    bool last_is_asked_ = true;
-    double sum_ = 0, weight_ = 0;
-};
-
-// With a clock: the times at which states are asked for, its rate in the scene that the kernel is of, and its steps.
+// With a clock: its rate in the scene that the kernel is of, its steps, and the times at which states are asked for,
+// from `time` on (time_after).
 struct ClockedSteps {
-    Arrivals arrivals;
     GiNaC::ex rate;
     double step = 0;
+    Arrivals arrivals;
+    double time = 0;
 };
 
 class Reductions : public Reducer {
@@ -86,8 +61,7 @@ private:
     double first_time_ = 0, last_time_ = 0;
     bool has_begun_ = false;
     std::optional<Tape> rate_;  // of the clock
-    Arrivals arrivals_;
-    double step_ = 0;
+    ClockedSteps clocked_;
     std::int64_t arrived_ = 0;
 };
 

@@ -245,7 +245,8 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
     if (!scene.outputs.kept.empty()) {  // threads copy it: formulas are not for several at once
         ClockedSteps clocked;
         if (scene.clock)
-            clocked = {request.arrivals, clock_rate(starts_->with_settings(as_written_, request.first)), request.step};
+            clocked = {clock_rate(starts_->with_settings(as_written_, request.first)), request.step, request.arrivals,
+                       request.time};
         request.reducer = [reductions = std::make_shared<const Reductions>(scene, clocked)] {
             return std::make_unique<Reductions>(*reductions);
         };

@@ -31,10 +31,6 @@ std::vector<int> indices_of(const Scene& scene, const std::string& name) {
     return indices;
 }
 
-std::string base_of(const Coordinate& coordinate) {
-    return coordinate.written.substr(0, coordinate.written.find('['));
-}
-
 std::string label_of(const Coordinate& coordinate, const std::string& name) {
     return coordinate.unit.empty() ? name : fmt::format("{} [{}]", name, coordinate.unit);
 }
@@ -260,7 +256,7 @@ Picture sphere(const Scene& scene, const MotionRows& states) {
 std::vector<int> longest_array(const Scene& scene) {
     std::vector<int> longest;
     for (const Coordinate& coordinate : scene.coordinates)
-        if (const std::vector<int> array = indices_of(scene, base_of(coordinate)); array.size() > longest.size())
+        if (const std::vector<int> array = indices_of(scene, coordinate.array()); array.size() > longest.size())
             longest = array;
     return longest;
 }
@@ -295,7 +291,7 @@ Picture waterfall(const Scene& scene, const MotionRows& states) {
             curve.points.push_back({static_cast<double>(k + 1), states.time(row) + scale * states.q(row, array[k])});
         curves.push_back(curve);
     }
-    const std::string name = base_of(scene.coordinates[static_cast<std::size_t>(array.front())]);
+    const std::string name = scene.coordinates[static_cast<std::size_t>(array.front())].array();
     Axes axes{"index i", "time t"};
     axes.y_is_time = true;
     return picture_of(scene.title, curves, axes, fmt::format("{}[i] at {} times, one above the other.", name, lines));

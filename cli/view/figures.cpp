@@ -177,8 +177,7 @@ std::vector<DrawnFigure> hands_and_beads(const Scene& scene) {
 std::vector<ex> longest_array(const Scene& scene) {
     std::set<std::string> names;
     for (const Coordinate& coordinate : scene.coordinates)
-        if (const std::size_t bracket = coordinate.written.find('['); bracket != std::string::npos)
-            names.insert(coordinate.written.substr(0, bracket));
+        if (coordinate.array() != coordinate.written) names.insert(coordinate.array());
     std::vector<ex> longest;
     for (const std::string& name : names)
         if (const std::vector<ex> array = named(scene, name); array.size() > longest.size()) longest = array;

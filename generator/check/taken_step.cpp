@@ -15,8 +15,7 @@ namespace {
 class TakenStepCheck : DiscreteAction {
 public:
     TakenStepCheck(const Derivation& derivation, const TakenStep& step) : DiscreteAction(derivation), step_(step) {
-        for (const Coordinate& coordinate : derivation.scene.coordinates)
-            arrays_.push_back(coordinate.written.substr(0, coordinate.written.find('[')));
+        for (const Coordinate& coordinate : derivation.scene.coordinates) arrays_.push_back(coordinate.array());
         for (std::size_t i = 0; i < step.parameters.size(); ++i)
             formulas_.set(system_.parameters[i], step.parameters[i]);
         set(system_.q, step.positions.front());

@@ -83,6 +83,7 @@ std::string with_numbers(const std::string& macro, const std::string& otherwise)
         "#endif\n",
         macro, otherwise);
 }
+
 }  // namespace
 
 std::string before_support(Precision precision) {

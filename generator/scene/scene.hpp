@@ -26,6 +26,8 @@ struct Coordinate {
     std::string written = name;  // in formulas: x[3]
     Position force_at = {};      // where its first force stands
     bool follows = false;        // its start is left out: its equation tells it
+
+    std::string array() const { return written.substr(0, written.find('[')); }  // x of x[3], and of x
 };
 
 struct Parameter {

@@ -18,12 +18,6 @@ constexpr double displaced = 0.01;  // of its amplitude, at the start: what move
 constexpr double held_at_zero = 0x1p-100;
 constexpr double many_roundings = 0x1p-45;  // of the largest amplitude: what starts with more was meant to
 constexpr std::size_t first_compared = 16;  // comparisons: by then other motions are known, if steps are of any use
-constexpr double part_of_step = 1.0 / 16;   // that is a part of the amplitude of all motions that a step resolves
-constexpr double nowhere = 1e-6;            // of what it goes in a step
-constexpr double at_rest = 0x1p-46;         // of the largest pace or amplitude of its kind: rounding
-constexpr double slight_part = 0.01;        // of the largest amplitude of its kind
-constexpr double slight_product = 1e-5;     // of amplitudes of position and momentum, which does not depend on units
-constexpr double shrinks = 1.3;             // by as much with 2/3 of the step, at least: an error of steps
 
 }  // namespace
 
@@ -35,18 +29,10 @@ std::vector<int> amplitude_groups(const Scene& scene) {
     std::map<std::string, int> numbers;
     std::vector<int> groups;
     for (const Coordinate& coordinate : scene.coordinates) {
-        const std::string array = coordinate.written.substr(0, coordinate.written.find('['));
+        const std::string array = coordinate.array();
         groups.push_back(numbers.try_emplace(array, static_cast<int>(numbers.size())).first->second);
     }
     return groups;
-}
-
-std::vector<bool> held_by_walls(const Scene& scene) {
-    std::vector<bool> held;
-    for (const Coordinate& coordinate : scene.coordinates)
-        held.push_back(std::any_of(scene.impacts.begin(), scene.impacts.end(),
-                                   [&](const Impact& impact) { return impact.when.value.has(coordinate.position); }));
-    return held;
 }
 
 void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count) {
@@ -125,70 +111,6 @@ void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons
         }
         if (i < n && amplitudes[i] == 0) amplitudes[n + i] = 0;
     }
-}
-
-std::vector<double> pace_at(LoadedStepper<double>& stepper, double step, const std::vector<double>& row) {
-    const auto begin = row.begin() + 1, middle = begin + (std::ssize(row) - 1) / 2;
-    const std::vector<double> q(begin, middle), p(middle, row.end());
-    std::vector<double> pace, Lv, Lq;
-    if (stepper.start(row[0], q, p) != LOBATTO_OK) return {};  // with a clock it knows its energy from then on
-    if (stepper.velocity(row[0], q, p, pace) != LOBATTO_OK) return {};
-    stepper.slopes(row[0], q, pace, Lv, Lq);
-    pace.insert(pace.end(), Lq.begin(), Lq.end());
-    for (double& one : pace) one = std::fabs(one * step);
-    return pace;
-}
-
-void widen_by_pace(std::vector<double>& amplitudes, const std::vector<bool>& meets_wall,
-                   const std::vector<double>& pace) {
-    for (std::size_t k = 0; k < pace.size() / 2; ++k)
-        if (meets_wall[k] && amplitudes[k] < nowhere * pace[k]) amplitudes[k] = part_of_step * pace[k];
-}
-
-std::vector<bool> slight(const std::vector<double>& amplitudes) {
-    const std::size_t n = amplitudes.size() / 2;
-    double largest[2] = {0, 0}, product = 0;
-    for (std::size_t i = 0; i < 2 * n; ++i) largest[i / n] = std::fmax(largest[i / n], amplitudes[i]);
-    for (std::size_t k = 0; k < n; ++k) product = std::fmax(product, amplitudes[k] * amplitudes[n + k]);
-    std::vector<bool> result(n);
-    for (std::size_t k = 0; k < n; ++k)
-        result[k] = amplitudes[k] < slight_part * largest[0] && amplitudes[n + k] < slight_part * largest[1] &&
-                    amplitudes[k] * amplitudes[n + k] < slight_product * product;
-    return result;
-}
-
-std::vector<bool> rests_beside(LoadedStepper<double>& stepper, double step, const Rows& rows,
-                               const std::vector<double>& amplitudes, const std::vector<bool>& asked) {
-    const std::size_t n = asked.size();
-    std::vector<bool> rests(n, false);
-    const std::vector<double> first = rows.empty() ? std::vector<double>() : pace_at(stepper, step, rows.front());
-    if (first.empty()) return rests;
-    double largest[2] = {0, 0};
-    for (std::size_t i = 0; i < 2 * n; ++i)
-        largest[i / n] = std::fmax(largest[i / n], std::fmax(first[i], amplitudes[i]));
-    for (std::size_t k = 0; k < n; ++k) {
-        rests[k] = asked[k] && first[k] <= at_rest * largest[0] && first[n + k] <= at_rest * largest[1];
-        for (std::size_t j = 1; j < rows.size() && rests[k]; ++j) {
-            std::vector<double> row = rows[j];
-            for (const std::size_t i : {k, n + k}) row[1 + i] = rows.front()[1 + i];
-            const std::vector<double> pace = pace_at(stepper, step, row);
-            rests[k] = !pace.empty() && pace[k] < amplitudes[k] && pace[n + k] < amplitudes[n + k];
-        }
-    }
-    return rests;
-}
-
-void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& of_run,
-                               const std::vector<double>& of_companion,
-                               const std::function<std::vector<bool>(const std::vector<bool>& asked)>& rests) {
-    const std::size_t n = amplitudes.size() / 2;
-    std::vector<bool> asked = slight(amplitudes);
-    for (std::size_t i = 0; i < 2 * n; ++i)
-        asked[i % n] = asked[i % n] && amplitudes[i] > 0 && of_run[i] > shrinks * of_companion[i];
-    if (std::none_of(asked.begin(), asked.end(), [](bool any) { return any; })) return;
-    const std::vector<bool> at_rest = rests(asked);
-    for (std::size_t k = 0; k < n; ++k)
-        if (at_rest[k]) amplitudes[k] = amplitudes[n + k] = 0;
 }
 
 std::vector<double> places_of(const std::vector<double>& least, const std::vector<double>& most,

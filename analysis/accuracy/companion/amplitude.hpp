@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "generator/scene/scene.hpp"
-#include "runtime/build/library.hpp"
 
 namespace lobatto {
 
@@ -24,9 +23,6 @@ double beside(double start);
 
 // Coordinates whose errors are measured by one amplitude have the same number: those of an array.
 std::vector<int> amplitude_groups(const Scene& scene);
-
-// The coordinates that stand in the formulas of walls.
-std::vector<bool> held_by_walls(const Scene& scene);
 
 // Takes a row of `count` numbers into a range.
 void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count);
@@ -60,34 +56,6 @@ struct FirstMoves {
 void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& places,
                         double steps, double epsilon, const FirstMoves& first,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
-
-// States of a run, t, q, p, the first at its start; where there is no kernel in double there are none.
-using Rows = std::vector<std::vector<double>>;
-
-// How far each number would go in a step at the pace of a state, q then p. Empty where the state is refused. `stepper`
-// is prepared.
-std::vector<double> pace_at(LoadedStepper<double>& stepper, double step, const std::vector<double>& row);
-
-// Between walls a body may be at one place after each step, of the run and of the companion. Where a position of these,
-// `meets_wall`, goes nowhere and has a velocity, its amplitude becomes a part of what it goes in a step. `pace`: at the
-// start.
-void widen_by_pace(std::vector<double>& amplitudes, const std::vector<bool>& meets_wall,
-                   const std::vector<double>& pace);
-
-// Which coordinates stay slight beside the others.
-std::vector<bool> slight(const std::vector<double>& amplitudes);
-
-// Which coordinates begin at rest, without a force, and would stay there wherever the others are: errors alone move
-// them. Of `asked` only.
-std::vector<bool> rests_beside(LoadedStepper<double>& stepper, double step, const Rows& rows,
-                               const std::vector<double>& amplitudes, const std::vector<bool>& asked);
-
-// The amplitudes of slight coordinates become 0 if they rest, and those of the run are larger than those of the
-// companion, whose steps are shorter: then they are errors of steps. `rests`: rests_beside, where there is one that
-// may.
-void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& of_run,
-                               const std::vector<double>& of_companion,
-                               const std::function<std::vector<bool>(const std::vector<bool>& asked)>& rests);
 
 // What the rounding of numbers in a range is measured by: the largest size of each, or what constraints make of it
 // (constraint_sizes.hpp; empty: there are none).

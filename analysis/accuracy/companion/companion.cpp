@@ -44,7 +44,7 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
       run_epsilon_(run_epsilon),
       is_finer_(kernel->epsilon < run_epsilon),
       groups_(amplitude_groups(outline.scene)),
-      meets_wall_(held_by_walls(outline.scene)),
+      meets_wall_(stands_in_walls(outline.scene)),
       rows_a_step_(1 + request.dense),
       narrow_(outline.system),
       constraints_(outline.system),

@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "analysis/accuracy/companion/amplitude.hpp"
+#include "analysis/accuracy/companion/errors_of_steps.hpp"
 #include "analysis/accuracy/companion/measured_error.hpp"
 #include "analysis/accuracy/companion/place.hpp"
 #include "analysis/accuracy/companion/short_contacts.hpp"

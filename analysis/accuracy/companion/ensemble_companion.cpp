@@ -9,6 +9,7 @@
 
 #include "analysis/accuracy/companion/amplitude.hpp"
 #include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/accuracy/companion/errors_of_steps.hpp"
 #include "runtime/build/number_stepper.hpp"
 #include "runtime/run/parts.hpp"
 
@@ -53,7 +54,7 @@ EnsembleCompanion::EnsembleCompanion(const Outline& outline, const Kernel& kerne
       parts_(static_cast<std::size_t>(kernel->parts)),
       request_(request),
       groups_(amplitude_groups(outline.scene)),
-      meets_wall_(held_by_walls(outline.scene)),
+      meets_wall_(stands_in_walls(outline.scene)),
       narrow_(outline.system),
       constraints_(outline.system),
       stepper_(plain) {}

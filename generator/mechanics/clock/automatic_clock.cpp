@@ -17,21 +17,24 @@ bool holds(const ex& expression, const Symbols& symbols) {
     return std::any_of(symbols.begin(), symbols.end(), [&](const GiNaC::symbol& s) { return expression.has(s); });
 }
 
+// With all positions `scale` times as far: a polynomial in `scale` where it is one in them.
+ex at_scale(const ex& expression, const Symbols& positions, const GiNaC::symbol& scale) {
+    GiNaC::exmap scaled;
+    for (const GiNaC::symbol& q : positions) scaled[q] = scale * q;
+    return expression.subs(scaled, GiNaC::subs_options::no_pattern).expand();
+}
+
 // The degree of a polynomial in the positions, all of them together; 1 for what is none.
 GiNaC::numeric degree_of(const ex& base, const Symbols& positions) {
     const GiNaC::symbol scale("scale");
-    GiNaC::exmap scaled;
-    for (const GiNaC::symbol& q : positions) scaled[q] = scale * q;
-    const ex whole = base.subs(scaled, GiNaC::subs_options::no_pattern).expand();
+    const ex whole = at_scale(base, positions, scale);
     return whole.is_polynomial(scale) ? std::max(whole.degree(scale), 1) : 1;
 }
 
-// Of a factor that holds positions: its least degree, or 0.
-GiNaC::numeric least_degree_of(const ex& factor, const Symbols& positions) {
+// The degree of its lowest terms; 0 for what is none.
+GiNaC::numeric least_degree_of(const ex& base, const Symbols& positions) {
     const GiNaC::symbol scale("scale");
-    GiNaC::exmap scaled;
-    for (const GiNaC::symbol& q : positions) scaled[q] = scale * q;
-    const ex whole = factor.subs(scaled, GiNaC::subs_options::no_pattern).expand();
+    const ex whole = at_scale(base, positions, scale);
     return whole.is_polynomial(scale) ? whole.ldegree(scale) : 0;
 }
 

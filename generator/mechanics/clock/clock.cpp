@@ -36,6 +36,19 @@ void require_conservation(const Scene& scene) {
             "clock, or the time from the Lagrangian");
 }
 
+// What is computed from values at the start; InputError where one is not finite and real.
+template <class Work>
+auto with_value_at_start(const Scene& scene, const Work& work) {
+    try {
+        return work();
+    } catch (const std::domain_error&) {
+        fail_at_clock(
+            scene,
+            "the clock, or the Lagrangian, has no finite real value at the start; start elsewhere, or mend the "
+            "formula");
+    }
+}
+
 class Transformation {
 public:
     explicit Transformation(const Scene& scene) : scene_(scene), g_(clock_rate(scene)) {
@@ -133,18 +146,13 @@ private:
 ex clock_rate(const Scene& scene) {
     if (scene.clock->is_applied) return scene.clock->rate;
     require_conservation(scene);
-    return scene.clock->is_automatic ? automatic_clock(scene) : scene.clock->rate;
+    return with_value_at_start(scene,
+                               [&] { return scene.clock->is_automatic ? automatic_clock(scene) : scene.clock->rate; });
 }
 
 Scene in_clock_time(const Scene& scene) {
     if (!scene.clock || scene.clock->is_applied) return scene;
-    try {
-        return Transformation(scene).transform();
-    } catch (const std::domain_error&) {
-        fail_at_clock(scene,
-                      "the clock, or the Lagrangian, has no finite real value at the start; start "
-                      "elsewhere, or mend the formula");
-    }
+    return with_value_at_start(scene, [&] { return Transformation(scene).transform(); });
 }
 
 void refuse_clock(const Scene& scene, const std::string& what) {

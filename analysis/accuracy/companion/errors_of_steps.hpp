@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// What velocities and forces tell of amplitudes: that errors of steps alone move a coordinate, which then has none, and
+// that a body between walls has one, though it is at one place after each step.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "generator/scene/scene.hpp"
+#include "runtime/build/library.hpp"
+
+namespace lobatto {
+
+// The coordinates that stand in the formulas of walls.
+std::vector<bool> stands_in_walls(const Scene& scene);
+
+// States t, q, p of a run, its start first.
+using Rows = std::vector<std::vector<double>>;
+
+// How far each number would go in a step at the pace of a state, q then p. Empty where the state is refused. `stepper`
+// is prepared.
+std::vector<double> pace_at(LoadedStepper<double>& stepper, double step, const std::vector<double>& row);
+
+// Between walls a body may be at one place after each step, of the run and of the companion. Where a position of these,
+// `meets_wall`, goes nowhere and has a velocity, its amplitude becomes a part of what it goes in a step. `pace`: at the
+// start.
+void widen_by_pace(std::vector<double>& amplitudes, const std::vector<bool>& meets_wall,
+                   const std::vector<double>& pace);
+
+// Which coordinates stay slight beside the others.
+std::vector<bool> slight(const std::vector<double>& amplitudes);
+
+// Which coordinates begin at rest, without a force, and would stay there wherever the others are: errors alone move
+// them. Of `asked` only.
+std::vector<bool> rests_beside(LoadedStepper<double>& stepper, double step, const Rows& rows,
+                               const std::vector<double>& amplitudes, const std::vector<bool>& asked);
+
+// The amplitudes of slight coordinates become 0 if they rest, and those of the run are larger than those of the
+// companion, whose steps are shorter: then they are errors of steps. `rests`: rests_beside, where there is one that
+// may.
+void leave_out_errors_of_steps(std::vector<double>& amplitudes, const std::vector<double>& of_run,
+                               const std::vector<double>& of_companion,
+                               const std::function<std::vector<bool>(const std::vector<bool>& asked)>& rests);
+
+}  // namespace lobatto
