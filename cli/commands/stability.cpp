@@ -48,6 +48,7 @@ fs::path chart_path(const std::string& given, const std::string& scene) {
     if (const fs::path folder = path.parent_path(); !folder.empty() && !fs::is_directory(folder))
         throw InputError(fmt::format("--chart {}: there is no folder {}; make it first", given, folder.string()));
     keep_scene(scene, given);
+    keep_foreign(given);
     return path;
 }
 
@@ -61,7 +62,7 @@ std::string text_of_splitting(const Method& method) {
             text += fmt::format("  unstable to {:.10f}; growth per step: up to about 1 + {:.2g}\n", steps.to,
                                 std::expm1(steps.rate));
         else
-            text += "  unstable beyond, as far as is looked\n";
+            text += "  unstable beyond\n";
     }
     return text;
 }

@@ -244,10 +244,13 @@ private:
         path_ = {path_.front()};
         Numbers p = step_.p0;
         for (std::size_t j = 0; j + 1 < controls(); ++j) {
-            formulas_.set(system_.t, t0_ + nodes_[j] * h_);
             set(system_.q, path_.back());
-            const Numbers force = formulas_.evaluate(force_);
-            for (std::size_t k = 0; k < n_; ++k) p[k] = p[k] + h_ * weights_[j] * force[k];
+            for (std::size_t i = 0; i < nodes_.size(); ++i) {
+                if (cln::zerop(B(i, j))) continue;  // no kick here, as at the ends of a step that begins with a drift
+                formulas_.set(system_.t, t0_ + nodes_[i] * h_);
+                const Numbers force = formulas_.evaluate(force_);
+                for (std::size_t k = 0; k < n_; ++k) p[k] = p[k] + h_ * weights_[i] * force[k];
+            }
             const Numbers velocity = solve(mass, p);
             Numbers next = path_.back();
             for (std::size_t k = 0; k < n_; ++k) next[k] = next[k] + h_ * (control_[j + 1] - control_[j]) * velocity[k];

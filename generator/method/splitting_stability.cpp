@@ -46,7 +46,7 @@ private:
     std::vector<long double> kicks_, drifts_;
 };
 
-constexpr long double stride = 0.005L, furthest = 100;
+constexpr long double stride = 0.005L, furthest = 100, between = 1e-9L;
 
 }  // namespace
 
@@ -79,18 +79,18 @@ std::vector<UnstableSteps> unstable_steps(const Quadrature& quadrature) {
             double rate = 0;
             for (int i = 1; i < 64; ++i) rate = std::max(rate, rate_at(from + (to - from) * i / 64));
             limits.erase(limits.begin(), limits.begin() + 2);
-            if (rate >= 0.1) {
-                result.push_back({static_cast<double>(from), std::numeric_limits<double>::infinity(), rate});
-                return result;
-            }
-            if (rate > 0) result.push_back({static_cast<double>(from), static_cast<double>(to), rate});
-        }
-        if (limits.size() == 1 && rate_at(x + stride) >= 0.1) {
-            result.push_back(
-                {static_cast<double>(limits[0]), std::numeric_limits<double>::infinity(), rate_at(x + stride)});
-            return result;
+            if (rate == 0) continue;
+            // Where b and c vanish together, to the digits known, no step lies between two intervals.
+            if (!result.empty() && from - result.back().to < between)
+                result.back() = {result.back().from, static_cast<double>(to), std::max(result.back().rate, rate)};
+            else
+                result.push_back({static_cast<double>(from), static_cast<double>(to), rate});
         }
     }
+    if (!limits.empty() && !result.empty() && limits[0] - result.back().to < between)
+        result.back().to = std::numeric_limits<double>::infinity();
+    else if (!limits.empty())
+        result.push_back({static_cast<double>(limits[0]), std::numeric_limits<double>::infinity(), rate_at(furthest)});
     return result;
 }
 

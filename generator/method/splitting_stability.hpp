@@ -14,9 +14,9 @@ struct UnstableSteps {
     double from = 0, to = 0, rate = 0;
 };
 
-// The unstable intervals from 0 on, until one with a rate of 1/10 or more; beyond that nothing is told, and its end is
-// infinite. Between them steps are bounded. The zeros of b and c of (D20), which have one sign there, are found in
-// 64-bit arithmetic to 1e-12: the coefficients are decimals of 15 digits, and exact polynomials of them fill pages.
+// The unstable intervals; the last one has no end. Between them steps are bounded. The zeros of b and c of (D20), which
+// have one sign there, are found in 64-bit arithmetic to 1e-12: the coefficients are decimals of 15 digits, and exact
+// polynomials of them fill pages.
 std::vector<UnstableSteps> unstable_steps(const Quadrature& quadrature);
 
 }  // namespace lobatto

@@ -227,10 +227,10 @@ void shift_resting(Shifts& of, const std::vector<__float128>& T) {
         const real other = ordinary[block / n];
         if (most(sizes, block) < real(1e-20) * other)
             for (std::size_t i = block; i < block + n; ++i) sizes[i] = other, shifts[i] = real(1e-14) * other;
-        // For a component that rests at zero.
-        const real most_size = most(sizes, block) > 0 ? most(sizes, block) : real(1),
-                   most_shift =
-                       std::min(most(shifts, block) > 0 ? most(shifts, block) : real(1), real(1e-6) * most_size);
+        // For a component that rests at zero, also where all of them do.
+        const real alone = block == n && unit > 0 ? unit : real(1),
+                   most_size = most(sizes, block) > 0 ? most(sizes, block) : alone,
+                   most_shift = std::min(most(shifts, block) > 0 ? most(shifts, block) : alone, real(1e-6) * most_size);
         for (std::size_t i = block; i < block + n; ++i) {
             if (sizes[i] > 0) {
                 shifts[i] = std::max(shifts[i], real(1e-14) * sizes[i]);

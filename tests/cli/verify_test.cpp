@@ -39,7 +39,8 @@ TEST_CASE("both scenes of the paper verify, with any number of points") {
 }
 
 TEST_CASE("splitting methods verify, to the digits that their coefficients have") {
-    const std::vector<std::pair<std::string, std::string>> methods{{"6", "4"}, {"11", "6"}, {"17", "8"}, {"35", "10"}};
+    const std::vector<std::pair<std::string, std::string>> methods{
+        {"6", "4"}, {"11", "6"}, {"14", "6"}, {"17", "8"}, {"35", "10"}};
     for (const auto& method : methods) {
         INFO(method.first);
         const Finished result = verify({LOBATTO_SOURCE_DIR "/scenes/henon_heiles.toml", "--splitting", method.first});
@@ -268,6 +269,16 @@ TEST_CASE("right kernels are not accused where the equations of a step are badly
         CHECK(!contains(result.out, "FAILED"));
         CHECK(contains(result.out, motion.says));
     }
+}
+
+TEST_CASE("an equilibrium is not accused of the rounding of its energy") {
+    const TemporaryFolder folder;
+    write_text(folder / "rest.toml",
+               scene_text("1e-12*((x'^2 + y'^2)/2 - 5*(1 - cos(x)) - 7*(1 - cos(y)) - 3*x*y)",
+                          "x = { position = 0, velocity = 0 }\ny = { position = 0, velocity = 0 }", "0.1"));
+    const Finished result = verify({(folder / "rest.toml").string()});
+    CHECK_MESSAGE(result.exit_code == 0, result.out);
+    CHECK(contains(result.out, "the motion rests"));
 }
 
 TEST_CASE("a check that fails ends with exit code 3, the check's name and what it means") {
