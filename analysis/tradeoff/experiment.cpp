@@ -204,6 +204,11 @@ double Experiment::fewest_steps(StepClock clock) const {
                                                   : radians_.at(clock) / clocked_radians);
 }
 
+bool Experiment::heeds_tolerance(const Member& member) const {
+    const System& system = kernels_.derivation(member.clock).system;
+    return member.iterates() && !system.linear && !(system.separable && member.precision == Precision::double_double);
+}
+
 double Experiment::stability_limit_of(const Member& member) const {
     const bool is_known = member.clock == StepClock::none && scene_.constraints.empty() && !scene_.is_cut();
     return is_known ? stability_limit(quadrature_of(member.method())) : std::nan("");

@@ -54,6 +54,8 @@ public:
     // The numbers of steps that are tried, and the least of them.
     StepLadder ladder(double ratio) const { return {reference_.samples, ratio}; }
     double fewest_steps(StepClock clock) const;
+    // Whether its steps end at a tolerance: others are solved to rounding at no further cost.
+    bool heeds_tolerance(const Member& member) const;
     // Of h times the frequency; not a number where none is known: with clocks, constraints and cut steps.
     double stability_limit_of(const Member& member) const;
     // With fewer, equal ones the steps of this member are unstable at most places of the motion.

@@ -116,7 +116,9 @@ std::optional<Scan> refinement(const Experiment& experiment, const std::set<Scan
         for (const double tolerance : {0.0, 1e-12, 1e-9, 1e-6})
             for (const Member& member : winners) {
                 if (member.precision == Precision::quadruple) continue;
-                if (tolerance > 0 && (!member.iterates() || tolerance < 4 * rounding_of(member.precision))) continue;
+                if (tolerance > 0 &&
+                    (!experiment.heeds_tolerance(member) || tolerance < 4 * rounding_of(member.precision)))
+                    continue;
                 if (const Scan scan{member, ratio, tolerance}; done.count(scan) == 0) return scan;
             }
     return std::nullopt;

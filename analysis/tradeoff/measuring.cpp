@@ -22,7 +22,8 @@ constexpr std::int64_t looks = 1500;     // steps whose error is looked at
 constexpr int defect_limit = 32;         // coordinates; tangent maps of more take long
 constexpr double timing_seconds = 4e-3;  // of repetitions in all
 constexpr int most_repetitions = 5;
-constexpr double block_seconds = 0.05;  // between two looks at the interruption
+constexpr double block_seconds = 0.05;      // between two looks at the interruption
+constexpr std::int64_t most_of_chain = 16;  // times the steps that a candidate is to take
 
 // A run of the kernel with records at the samples, in blocks so that it can be interrupted. With a clock the samples
 // are arrivals, beside the chain of its steps.
@@ -77,6 +78,11 @@ struct TimedRun {
         return status == LOBATTO_OK;
     }
 
+    // On a motion that is lost the steps of a chain may shrink to nothing.
+    void give_up_endless_chain(const Candidate& candidate) {
+        if (status == LOBATTO_OK && steps > most_of_chain * candidate.steps) status = LOBATTO_TIME_STANDS_STILL;
+    }
+
     void go(const Candidate& candidate, const volatile int* interrupted, double limit) {
         const bool is_clocked = candidate.member.clock != StepClock::none;
         const std::int64_t all = is_clocked ? meetings : candidate.steps;
@@ -93,7 +99,8 @@ struct TimedRun {
             advance(call, interrupted);
             done += call.steps_done;
             written += call.records_written;
-            if (took < block_seconds / 4) block *= 2;
+            if (call.steps_done == block && took < block_seconds / 4) block *= 2;
+            if (is_clocked) give_up_endless_chain(candidate);
         }
         if (written < meetings && status == LOBATTO_OK) status = LOBATTO_NOT_FINITE;
     }
@@ -113,6 +120,7 @@ struct TimedRun {
             call.records = rows.data() + size;
             call.capacity = room;
             advance(call, interrupted);
+            give_up_endless_chain(candidate);
             has_arrived = call.steps_done == 1;
             rows.resize(size + static_cast<std::size_t>(call.records_written) * columns());
         }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <regex>
 #include <vector>
 
@@ -66,6 +67,21 @@ std::vector<Line> lines_of(const std::string& text) {
     return lines;
 }
 
+// What follows the value on a line: "  # seconds".
+std::string comment_of(const std::string& line) {
+    char quote = 0;
+    for (std::size_t i = 0; i < line.size(); ++i) {
+        if (quote != 0 && line[i] == '\\' && quote == '"') {
+            ++i;
+        } else if (quote != 0 ? line[i] == quote : line[i] == '"' || line[i] == '\'') {
+            quote = quote == 0 ? line[i] : '\0';
+        } else if (quote == 0 && line[i] == '#') {
+            return line.substr(line.find_last_not_of(" \t", i - 1) + 1);
+        }
+    }
+    return "";
+}
+
 bool sets_output(const std::string& text, const std::vector<std::string>& keys) {
     const std::vector<Line> lines = lines_of(text);
     return std::any_of(lines.begin(), lines.end(), [&](const Line& line) {
@@ -99,6 +115,9 @@ std::string with_choice(const std::string& text, const Choice& choice, double er
     std::string result;
     bool has_method = false;
     const std::vector<Line> lines = lines_of(text);
+    std::map<std::string, std::string> comments;  // of [run]
+    for (const Line& line : lines)
+        if (line.table == "run" && !line.key.empty()) comments[line.key] = comment_of(line.text);
     for (const Line& line : lines) {
         if (line.header && line.table == "method") {
             has_method = true;
@@ -114,9 +133,9 @@ std::string with_choice(const std::string& text, const Choice& choice, double er
                 result += '\n';
                 has_method = true;
             }
-            result += line.text + '\n' + "step = " + step_text(choice) + '\n';
-            result += "error = " + exact_text(error) + '\n';
-            if (until) result += "until = " + exact_text(choice.until) + '\n';
+            result += line.text + '\n' + "step = " + step_text(choice) + comments["step"] + '\n';
+            result += "error = " + exact_text(error) + comments["error"] + '\n';
+            if (until) result += "until = " + exact_text(choice.until) + comments["until"] + '\n';
             continue;
         }
         const bool replaced =
@@ -136,16 +155,31 @@ void write_method(const Choice& choice, const Scene& scene, double error, bool u
             "mean something else there ({}). Change them, and copy the lines above",
             scene.path, choice.clock.empty() ? "no clock" : "the clock " + choice.clock,
             choice.clock.empty() ? "a number of steps" : "a time"));
-    const Scene back = read_scene(Source(scene.path, text));
-    if (back.method.family != candidate.member.family || back.method.points != candidate.member.points ||
-        back.method.tolerance != candidate.tolerance || back.method.arithmetic != candidate.member.arithmetic ||
-        back.method.numbers != candidate.member.precision || (back.clock ? back.clock->text : "") != choice.clock ||
-        back.evaluate(back.run.step, "the step").to_double() != choice.step())
+    const auto fits = [&] {
+        try {
+            const Scene back = read_scene(Source(scene.path, text));
+            return back.method.family == candidate.member.family && back.method.points == candidate.member.points &&
+                   back.method.tolerance == candidate.tolerance &&
+                   back.method.arithmetic == candidate.member.arithmetic &&
+                   back.method.numbers == candidate.member.precision &&
+                   (back.clock ? back.clock->text : "") == choice.clock &&
+                   back.evaluate(back.run.step, "the step").to_double() == choice.step();
+        } catch (const InputError&) {  // of a text that nobody has written
+            return false;
+        }
+    };
+    if (!fits())
         throw InputError(
             fmt::format("{}: the method cannot be written into this file, whose [method] or [run] is laid out "
                         "unusually; copy the lines above",
                         scene.path));
-    write_whole(scene.path, "the scene", text, "copy the lines above into it");
+    const std::string now = read_whole(scene.path).value_or(""), mark = "\xEF\xBB\xBF";  // of the order of bytes
+    const bool is_marked = now.starts_with(mark);
+    if (now.substr(is_marked ? mark.size() : 0) != scene.source.content())
+        throw InputError(fmt::format(
+            "{}: the file has changed since it was read, so nothing is written; copy the lines above into it",
+            scene.path));
+    write_whole(scene.path, "the scene", (is_marked ? mark : "") + text, "copy the lines above into it");
 }
 
 }  // namespace lobatto

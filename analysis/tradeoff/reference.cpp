@@ -25,8 +25,8 @@ double seconds_since(Clock::time_point start) {
 // Numbers with many divisors, so that many numbers of steps meet many of the samples.
 constexpr int sample_counts[] = {2520, 840, 360, 120, 60};
 constexpr double rough = 1e-6;            // tolerance of the first look
-constexpr double fine = 1e-15;            // likewise, where constraints hold what hardly moves
-constexpr double held = 1000;             // tolerances: constraints leave as much to what rests
+constexpr double fine = 1e-15;            // likewise, where something hardly moves
+constexpr double held = 1000;             // tolerances: as much is left to what rests
 constexpr double precise_factor = 6;      // what the precise way takes longer, at most, about
 constexpr double half = 0.5;              // of the seconds, for a first way; the rest is for finer steps
 constexpr double overtime = 1.25;         // of the seconds: then it is given up
@@ -185,20 +185,22 @@ private:
         return states;
     }
 
-    // On all of the way: samples may miss a close encounter. What moves by no more than the tolerance leaves to what
-    // constraints hold may rest: a finer look tells.
+    // On all of the way: samples may miss a close encounter. What moves by no more than the tolerance leaves to a
+    // number of its size, or to what constraints hold, may rest: a finer look tells. Then its size counts.
     void set_scale(const std::vector<real>& least, const std::vector<real>& most, real tolerance) {
         spread([&](std::size_t i) { return (most[i] - least[i]) / 2; }, scale_);
         hardly_moves_ = false;
-        std::vector<real> places(2 * n_, real(0));
+        std::vector<real> places(2 * n_, real(0)), sizes(2 * n_);
         if (!request_.places.empty())
             spread([&](std::size_t i) { return static_cast<real>(request_.places[i]); }, places);
-        for (std::size_t i = 0; i < n_; ++i) {
-            if (places[i] > 0 && scale_[i] <= static_cast<real>(held) * tolerance * places[i]) {
-                hardly_moves_ = true;
-                scale_[i] = places[i];
-                scale_[n_ + i] = 1;
-            }
+        spread([&](std::size_t i) { return std::max(-least[i], most[i]); }, sizes);
+        const real small = static_cast<real>(held) * tolerance;
+        for (std::size_t i = 0; i < 2 * n_; ++i) {
+            const real size = std::max(i < n_ ? places[i] : real(0), sizes[i]);
+            if (!(size > 0 && scale_[i] <= small * size)) continue;
+            hardly_moves_ = true;
+            scale_[i] = size;
+            if (i < n_ && places[i] > 0) scale_[n_ + i] = 1;
         }
         for (real& value : scale_)
             if (!(value > 0)) value = 1;

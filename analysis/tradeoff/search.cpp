@@ -31,10 +31,6 @@ double fitting_tolerance(double goal, double digits, Precision numbers) {
     return std::pow(10.0, std::clamp(std::floor(std::log10(goal)) - digits, least, -3.0));
 }
 
-bool has_tolerance(Experiment& experiment, const Member& member) {
-    return member.iterates() && experiment.kernel_builder().kernel(member)->linear == 0;
-}
-
 // Whether more steps than before bring nothing.
 bool is_rounding(const Measurement& m, const std::optional<Measurement>& before, double least_before) {
     if (!m.complete || !before || !before->complete || !(m.error > 0.7 * std::fmin(before->error, least_before)))
@@ -114,7 +110,7 @@ Attempt cross(Experiment& experiment, const Member& member, double goal, double 
     if (good) {
         result.measurement = experiment.time_again(*good, 1);
         result.seconds = result.measurement->seconds;
-        if (has_tolerance(experiment, member)) {
+        if (experiment.heeds_tolerance(member)) {
             const Measurement looser = experiment.measure(
                 {member, good->candidate.steps, fitting_tolerance(goal, 2, member.precision)}, false);
             if (looser.complete && looser.error < 2 * goal)
@@ -153,7 +149,8 @@ Measurement polish(Experiment& experiment, const Measurement& crossing, double g
     if (starts.size() > 2) starts = {starts.front(), starts.back()};
     std::vector<double> tolerances = {0};
     for (const double digits : {0.0, 1.0, 2.0, 3.0, 4.0})
-        if (has_tolerance(experiment, member) && tolerances.back() != fitting_tolerance(goal, digits, member.precision))
+        if (experiment.heeds_tolerance(member) &&
+            tolerances.back() != fitting_tolerance(goal, digits, member.precision))
             tolerances.push_back(fitting_tolerance(goal, digits, member.precision));
     for (const double tolerance : tolerances)
         for (const std::int64_t start : starts) {

@@ -135,6 +135,13 @@ std::string defect_text(const PreparedRun& run) {
                                             : "not measured: the first step has no derivative in this precision";
 }
 
+// Whether steps end at the tolerance: linear maps are exact, and the steps of constant masses in double-double are
+// solved to rounding by the one evaluation that they take.
+bool heeds_tolerance(const PreparedRun& run, const TrajectoryRequest& request) {
+    const bool is_refined = run.source.form == Form::separable && run.scene.method.numbers == Precision::double_double;
+    return request.tolerance > 0 && run.kernel->linear == 0 && !is_refined;
+}
+
 void print_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                  const Watch& watch) {
     const Scene& scene = run.scene;
@@ -163,7 +170,8 @@ void print_table(const PreparedRun& run, const TrajectoryRequest& request, const
         print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
     if (has_defect(run))
         print_row("symplectic defect",
-                  request.tolerance > 0 ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
+                  heeds_tolerance(run, request)
+                      ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
                   : scene.impacts.empty() ? defect_text(run)
                                           : defect_text(run) + ", of a step without impacts");
     if (const auto error = watch.position_error()) {
@@ -198,7 +206,7 @@ void print_events(const Scene& scene, const TrajectoryResult& result, const std:
 // Beside the trajectory: run.csv, run.events.csv. A pipe or a device has no beside: then as without -o.
 std::string event_path(const RunOptions& options, const Scene& scene) {
     std::error_code ignored;
-    const bool beside = options.output.empty() || (options.output != standard_output &&
+    const bool beside = options.output.empty() || (!is_standard_output(options.output) &&
                                                    (!std::filesystem::exists(options.output, ignored) ||
                                                     std::filesystem::is_regular_file(options.output, ignored)));
     std::string path = output_path(beside ? options.output : "", result_name(scene.path) + ".csv");
@@ -283,7 +291,7 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryResult& result, co
                           const Files& files) {
     if (!verdict.failure.empty())
         throw ComputationError(fmt::format("{}: {} What was computed {}.", scene.path, verdict.failure,
-                                           files.path() == standard_output ? "was written" : "is in " + files.path()));
+                                           is_standard_output(files.path()) ? "was written" : "is in " + files.path()));
     if (result.interrupted) {
         tell("lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, files.path(),
              files.keeps_checkpoints() ? " The same command with --resume continues from there." : "");
@@ -293,10 +301,10 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryResult& result, co
 
 // What a file of this kind cannot hold, or not go on with.
 void refuse_format(const RunOptions& options) {
-    const bool is_csv = options.output != standard_output && format_of(options) == TableFormat::csv;
+    const bool is_csv = !is_standard_output(options.output) && format_of(options) == TableFormat::csv;
     if (options.resume && !is_csv)
         throw InputError(fmt::format("--resume: {} cannot be continued, only a .csv can; leave --resume out",
-                                     options.output == standard_output ? "standard output" : options.output));
+                                     is_standard_output(options.output) ? "standard output" : options.output));
 }
 
 void run(const RunOptions& options) {
@@ -344,7 +352,7 @@ void run(const RunOptions& options) {
     say.clear();
     for (const std::string& warning : verdict.warnings) tell("lobatto: warning: {}.\n", warning);
     if (options.json) {
-        const bool is_exact = has_defect(run) && request.tolerance == 0 && result.steps_done > 0;
+        const bool is_exact = has_defect(run) && !heeds_tolerance(run, request) && result.steps_done > 0;
         fmt::print("{}", json_of_run(run, request, result, observers, verdict,
                                      is_exact ? defect_of(run.kernel, scene.method.numbers, scene) : std::nullopt,
                                      {path, has_events ? files.events_path() : ""}));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "analysis/tradeoff/method_text.hpp"
 #include "cli/commands/commands.hpp"
@@ -57,6 +58,10 @@ void print(const Choice& choice, const Scene& scene, double error) {
 void tune(const TuneOptions& options) {
     const double error = error_of(options);
     const api::Scene scene(options.scene);
+    if (std::error_code none; options.write && !std::filesystem::is_regular_file(options.scene, none))
+        throw InputError(fmt::format("--write: {} is no file that can be written; leave --write out", options.scene));
+    if (options.write && !options.overrides.set.empty())
+        throw InputError("--write: the file has other values than --set; change them there, then leave --set out");
     const Interruption interruption;
     Say say(options.budget.seconds());
     ChoiceRequest request;

@@ -239,6 +239,36 @@ TEST_CASE("with walls errors are those of positions, against |cos t| of a spring
           }).find("tune compares positions along the motion, and the wall wall moves x") != std::string::npos);
 }
 
+TEST_CASE("the unit of a conserved momentum makes no difference to an error") {
+    const auto error_with = [](const std::string& mass) {
+        const Scene scene = scene_of(
+            "lagrangian = \"m*(r'^2 + r^2*a'^2)/2 - m*2*(r - 1)^2\"\n[coordinates]\nr = { position = 1.3, velocity = 0 "
+            "}\na = { position = 0, velocity = 0.5 }\n[parameters]\nm = " +
+            mass + "\n[run]\nstep = 0.05\nuntil = 10\n");
+        ExperimentRequest wish;
+        wish.seconds = 3600;
+        wish.wanted = 1e-11;
+        Experiment experiment(scene, scene, wish);
+        return experiment.measure({{Family::lobatto, 6, Precision::double_}, 12, 0}, false).error;
+    };
+    const double error = error_with("1");
+    CHECK(error > 1e-9);
+    CHECK(error < 1e-4);
+    CHECK(error_with("3e20") == doctest::Approx(error).epsilon(1e-3));
+}
+
+TEST_CASE("a run whose clock makes ever smaller steps is given up") {
+    const Scene scene = scene_of(kepler_text(0.9, "points = 5", 2));
+    ExperimentRequest wish;
+    wish.seconds = 3600;
+    wish.wanted = 1e-11;
+    Experiment experiment(scene, scene, wish);
+    // Steps of two thirds of a revolution fall into the sun.
+    const Measurement m = experiment.measure(
+        {{Family::lobatto, 3, Precision::double_, StepArithmetic::plain, StepClock::automatic}, 3, 0}, false);
+    CHECK_FALSE((m.complete && m.error < 0.1));
+}
+
 TEST_CASE("a clock that tells no times apart is not tried") {
     const Scene scene = scene_of(kepler_text(0.05, "points = 5", 1));
     ExperimentRequest wish;
@@ -268,6 +298,26 @@ TEST_CASE("a clock is written into a scene, unless its states would be kept at o
     choice.measurement.candidate.member.clock = StepClock::none;
     write_method(choice, back, 1e-6, false);
     CHECK_FALSE(read_scene(path).clock);
+    const auto refusal = [&](const Scene& scene) {
+        return test::message_of<InputError>([&] { write_method(choice, scene, 1e-6, false); });
+    };
+    // What was written into the file since it was read stays, and so does who may read it.
+    const Scene early = read_scene(path);
+    const std::string edited = test::read_file(path) + "# edited\n";
+    test::write_text(path, edited);
+    CHECK(refusal(early).find("the file has changed since it was read, so nothing is written") != std::string::npos);
+    CHECK(test::read_file(path) == edited);
+    using std::filesystem::perms;
+    std::filesystem::permissions(path, perms::owner_read | perms::owner_write);
+    test::write_text(path, "\xEF\xBB\xBF" + edited);
+    CHECK(refusal(read_scene(path)).empty());
+    CHECK(test::read_file(path).starts_with("\xEF\xBB\xBFlagrangian"));
+    CHECK(std::filesystem::status(path).permissions() == (perms::owner_read | perms::owner_write));
+    // A layout that cannot be written into is not blamed for what would come of it.
+    std::string step = text;
+    step.replace(step.find("step = "), 7, "step = \"\"\"\n0.1\"\"\" # ");
+    test::write_text(path, step);
+    CHECK(refusal(read_scene(path)).find("laid out unusually; copy the lines above") != std::string::npos);
     choice.clock = "auto";
     test::write_text(path, text + "[output]\nevery = 10\n");
     CHECK(test::message_of<InputError>([&] {

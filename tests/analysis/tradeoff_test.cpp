@@ -195,6 +195,8 @@ TEST_CASE("a choice written into a scene leaves everything else, and reads back"
     CHECK(test::contains(changed, "until = 120 # s: about 100 swings"));  // its own comment
     CHECK(test::contains(changed, "[output]\nevery = 1     # keep every step\n"));
     CHECK(with_choice(changed, choice, 1e-8, false) == changed);  // once is enough
+    const std::string annotated = "[run]\nstep = \"1/10 # no\" # s, a tenth\nuntil = 120\n";
+    CHECK(test::contains(with_choice(annotated, choice, 1e-8, false), "step = 0.12 # s, a tenth\n"));
     const auto of_windows = [](const std::string& lines) {
         return std::regex_replace(lines, std::regex("\n"), "\r\n");
     };

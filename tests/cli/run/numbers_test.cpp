@@ -53,6 +53,19 @@ double distance(const std::vector<std::string>& a, const std::vector<std::string
 
 }  // namespace
 
+TEST_CASE("in double-double the steps of constant masses are solved to rounding, whatever the tolerance") {
+    const Place place;
+    const auto table = [&](const std::string& file, std::vector<std::string> tolerance) {
+        std::vector<std::string> words{"run", pendulum, "--until", "1", "--numbers", "double-double", "-o", file};
+        words.insert(words.end(), tolerance.begin(), tolerance.end());
+        const test::Finished finished = place.run(words);
+        CHECK_MESSAGE(finished.exit_code == 0, finished.err);
+        CHECK(!test::contains(finished.out, "not exact"));
+        return last_row(file);
+    };
+    CHECK(table(place.file("loose.csv"), {"--tolerance", "1e-3"}) == table(place.file("exact.csv"), {}));
+}
+
 TEST_CASE("runs in double-double and quadruple agree to 30 digits, and each file reads back to its numbers" *
           doctest::test_suite("slow")) {
     const Place place;
