@@ -185,7 +185,8 @@ private:
             !has_many_digits(options_.precision))
             text += "        lobatto::round_to_unit_determinant(k.Phi_minus_I);\n";
         if (is_map() && n_ > 1)
-            text += fmt::format("        return lobatto::linear_map<{}>(k, h);\n", name);
+            // A scene may be named like a variable here.
+            text += fmt::format("        return lobatto::linear_map<struct {}>(k, h);\n", name);
         else
             text += "        return Status::ok;\n";
         return "\n    // The coefficients of these parameters and this step size.\n" +

@@ -324,6 +324,9 @@ TEST_CASE("names that the emitted code uses itself compile" * doctest::test_suit
                     {"angles", "Angles", "angle"},
                     {"m", "near"}},
                    {3});
+    // A linear map of the name of an argument of `prepare`, and of a parameter.
+    for (const char* name : {"k", "stiffness"})
+        check_compiles({name, "(x'^2 + y'^2)/2 - stiffness*(x - y)^2/2", {"x", "y"}, {"stiffness"}}, {4});
     // Costly as derived, not so after the passes.
     check_compiles({"eighth", "x'^2/2 - x^2/2 - x^3/3 - x^4/4 - x^5/5 - x^6/6 - x^7/7 - x^8/8", {"x"}, {}}, {5});
 }
