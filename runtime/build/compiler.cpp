@@ -85,8 +85,9 @@ Compiler find_compiler(bool quadruple) {
         }
         compiler.words[0] = *program;
     }
-    for (const char* inexact : {"-ffast-math", "-funsafe-math-optimizations", "-ffinite-math-only",
-                                "-fassociative-math", "-freciprocal-math"})
+    for (const char* inexact :
+         {"-ffast-math", "-funsafe-math-optimizations", "-ffinite-math-only", "-fassociative-math", "-freciprocal-math",
+          "-fsingle-precision-constant", "-mpc32", "-mpc64"})
         if (std::find(compiler.words.begin(), compiler.words.end(), inexact) != compiler.words.end())
             throw MachineError(
                 fmt::format("the environment variable CXX asks for {}, which changes the results of "

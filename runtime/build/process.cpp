@@ -61,7 +61,8 @@ std::vector<char*> pointers_to(std::vector<std::string>& texts) {
     return pointers;
 }
 
-// What the child does between fork and exec: async-signal-safe calls only, since other threads may hold locks.
+// What the child does: async-signal-safe calls only, since other threads may hold locks. It leads a group of processes,
+// and its child becomes the program. When the calling thread dies, it kills the group: a compiler has children, too.
 struct Child {
     const char* folder;
     char* const* arguments;
@@ -69,18 +70,38 @@ struct Child {
     int input, output, error_report;
     pid_t parent;
 
-    [[noreturn]] void become_program() const {
-        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-        if (::getppid() != parent) ::_exit(127);  // it died before the line above
-        ::setpgid(0, 0);
-        for (const int signal : {SIGINT, SIGQUIT, SIGTERM, SIGPIPE, SIGCHLD, SIGHUP, SIGXFSZ})
-            std::signal(signal, SIG_DFL);
+    [[noreturn]] void lead() const {
+        for (const int signal : {SIGINT, SIGQUIT, SIGPIPE, SIGCHLD, SIGHUP, SIGXFSZ}) std::signal(signal, SIG_DFL);
+        std::signal(SIGTERM, [](int) { ::kill(0, SIGKILL); });
         sigset_t none;
         sigemptyset(&none);
         ::sigprocmask(SIG_SETMASK, &none, nullptr);
+        ::setpgid(0, 0);
+        ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+        if (::getppid() != parent) ::_exit(127);  // it died before the line above
+        const pid_t program = ::fork();
+        if (program == 0) become_program();
+        if (program < 0) report_error();
+        ::close_range(3, ~0U, 0);  // the ends of our pipes, and the caller's files, whose locks it would hold
+        int status = 0;
+        while (::waitpid(program, &status, 0) < 0 && errno == EINTR) {
+        }
+        if (WIFSIGNALED(status)) {
+            std::signal(WTERMSIG(status), SIG_DFL);
+            ::raise(WTERMSIG(status));
+        }
+        ::_exit(WEXITSTATUS(status));
+    }
+
+    [[noreturn]] void become_program() const {
+        std::signal(SIGTERM, SIG_DFL);
         if (::dup2(input, 0) >= 0 && ::dup2(output, 1) >= 0 && ::dup2(output, 2) >= 0 && ::chdir(folder) == 0) {
             ::execve(arguments[0], arguments, environment);
         }
+        report_error();
+    }
+
+    [[noreturn]] void report_error() const {
         const int error = errno;
         [[maybe_unused]] const ssize_t written = ::write(error_report, &error, sizeof error);
         ::_exit(127);
@@ -119,7 +140,7 @@ ProcessResult run_process(const ProcessRequest& request) {
                       *output_start,          *report_start,    ::getpid()};
     const pid_t pid = ::fork();
     if (pid < 0) fail(request, "fork", errno);
-    if (pid == 0) child.become_program();
+    if (pid == 0) child.lead();
     ::setpgid(pid, pid);  // also here: whoever comes first
     output_start.close();
     report_start.close();

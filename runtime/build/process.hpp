@@ -28,7 +28,7 @@ struct ProcessResult {
     bool succeeded() const { return exit_code == 0; }
 };
 
-// Its standard input is empty; it dies with the calling thread; whatever it leaves running in its process group is
+// Its standard input is empty. When it has ended, or the calling thread dies, all that runs in its process group is
 // killed. Throws MachineError when it cannot be started.
 ProcessResult run_process(const ProcessRequest& request);
 
