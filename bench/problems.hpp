@@ -221,6 +221,8 @@ struct Problem {
     long most_steps = 200'000;             // of an adaptive method, whose solution has escaped to infinity else
     std::vector<std::string> clocks = {};  // of our steps that follow the motion
     double fewest_chain_steps = 0;         // of them, where their scan begins
+
+    bool is_long() const { return revolutions > 1000; }  // a run takes seconds: fewer settings are tried
 };
 const std::vector<Problem>& problems();
 

@@ -73,18 +73,13 @@ Measurement measure(const Course& course, const Contestant& contestant, double s
     return result;
 }
 
-// Where a run takes seconds, fewer settings are tried and sooner given up.
-bool is_long(const Problem& problem) {
-    return problem.revolutions > 1000;
-}
-
 // Numbers of steps in ratios of about 2^(1/4); tolerances in the contestant's ratio; quick ones in larger ratios.
 std::vector<double> ladder_of(const Problem& problem, const Contestant& contestant, bool quick) {
     std::vector<double> settings;
     if (contestant.ladder == Ladder::tolerance) {
         const double ratio = quick ? std::max(contestant.ratio, 10.0) : contestant.ratio;
         // In a long race coarse ones lose so much energy that the inner orbit shrinks, and they take steps without end.
-        const double coarsest = is_long(problem) ? 1e-4 * contestant.coarsest : contestant.coarsest;
+        const double coarsest = problem.is_long() ? 1e-4 * contestant.coarsest : contestant.coarsest;
         for (double tolerance = coarsest; tolerance > 0.9 * contestant.finest; tolerance /= ratio)
             settings.push_back(tolerance);
         return settings;
@@ -103,7 +98,7 @@ void scan(const Course& course, Lane& lane, bool quick, double time_limit) {
     const double trajectories = static_cast<double>(course.starts.size()), most_preparation = 60;
     double preparation = 0;
     int fine = 0, slow = 0;
-    for (const double setting : ladder_of(course.problem, lane.contestant, quick || is_long(course.problem))) {
+    for (const double setting : ladder_of(course.problem, lane.contestant, quick || course.problem.is_long())) {
         if (preparation > most_preparation) break;
         const double prepared = lane.contestant.prepare ? lane.contestant.prepare(setting, course.starts.size()) : 0;
         preparation += prepared;
@@ -135,7 +130,7 @@ double time_limit_of(const Problem& problem, const std::vector<Lane>& lanes) {
     for (std::size_t i = targets.size(); i-- > 0;) {
         double best = infinity;
         for (const Lane& lane : lanes) best = std::min(best, fastest(lane, targets[i]));
-        if (best < infinity) return (is_long(problem) ? 3 : 8) * best;
+        if (best < infinity) return (problem.is_long() ? 3 : 8) * best;
     }
     return 5;
 }
@@ -200,7 +195,7 @@ Race run_race(const Problem& problem, int trajectories, const RaceOptions& optio
                 const auto known = [&](const auto& finalist) { return finalist.second == m; };
                 if (std::none_of(finalists.begin(), finalists.end(), known)) finalists.push_back({&lane.contestant, m});
             }
-    const int repetitions = is_long(problem) ? 3 : options.quick || trajectories > 1 ? 5 : 9;
+    const int repetitions = problem.is_long() ? 3 : options.quick || trajectories > 1 ? 5 : 9;
     for (int repetition = 0; repetition < repetitions; ++repetition)
         for (auto& [contestant, m] : finalists) {
             // Of short runs the first one waits for its program to come from memory, which none is asked for here.

@@ -28,10 +28,16 @@ std::string scene_path(const Problem& problem) {
     return std::string(LOBATTO_SOURCE_DIR) + "/bench/scenes/" + problem.scene;
 }
 
-std::vector<Method> methods_in_race(const Problem& problem, bool few, bool separable) {
+// `together`: as in kernels_of; clean arithmetic is for one trajectory alone.
+std::vector<Method> methods_in_race(const Problem& problem, bool few, bool separable, std::int64_t together) {
     std::vector<Method> methods;
-    // Equal steps have little chance there.
-    if (problem.positions_only) return {{Family::lobatto, 9}, {Family::lobatto, 12}, {Family::gauss, 10}};
+    // Equal steps have little chance there, but where a run is so long that rounding decides.
+    if (problem.positions_only) {
+        methods = {{Family::lobatto, 9}, {Family::lobatto, 12}, {Family::gauss, 10}};
+        if (problem.is_long() && together == 0)
+            for (const int points : {9, 10, 12}) methods.push_back({Family::lobatto, points, 0, StepArithmetic::clean});
+        return methods;
+    }
     for (const int points : {3, 4, 5, 6, 7, 8, 9, 10, 12})
         if (!few || points % 4 == 1) methods.push_back({Family::lobatto, points});
     for (const int stages : {2, 3, 4, 6, 8, 10})
@@ -40,6 +46,10 @@ std::vector<Method> methods_in_race(const Problem& problem, bool few, bool separ
         for (const int stages : sizes_of(Family::splitting))
             if (!few || stages == 11) methods.push_back({Family::splitting, stages});
     return methods;
+}
+
+bool is_clean(const Method& method) {  // such a step is always iterated to rounding
+    return method.arithmetic == StepArithmetic::clean;
 }
 
 long evaluations_of(const lobatto_kernel& kernel, const lobatto_advance& call) {
@@ -165,7 +175,8 @@ Contestant contestant_of(const Problem& problem, Method method, double tolerance
         }
         return run(h, steps, trajectories);
     };
-    const std::string name = method.name() + (tolerance > 0 ? fmt::format(", to {:.0e}", tolerance) : "");
+    const std::string name = fmt::format("{}{}{}", method.name(), is_clean(method) ? ", clean" : "",
+                                         tolerance > 0 ? fmt::format(", to {:.0e}", tolerance) : "");
     Contestant contestant{name, method.order(), true, true, Ladder::steps, race};
     contestant.cold_start = [&problem, method, together] { return cold_start_seconds(problem, method, together, ""); };
     return contestant;
@@ -214,12 +225,12 @@ std::vector<Kernel> kernels_of(const Problem& problem, const std::vector<Method>
 
 Contestants kernel_contestants(const Problem& problem, bool few, std::int64_t together) {
     const bool separable = derive(read_scene(scene_path(problem))).system.separable;
-    const std::vector<Method> methods = methods_in_race(problem, few, separable);
+    const std::vector<Method> methods = methods_in_race(problem, few, separable, together);
     const std::vector<Kernel> kernels = kernels_of(problem, methods, together, "");
     Contestants contestants;
     for (std::size_t i = 0; i < methods.size(); ++i)
         for (const double tolerance : tolerances_of(problem))
-            if (tolerance == 0 || methods[i].family != Family::splitting)
+            if (tolerance == 0 || (methods[i].family != Family::splitting && !is_clean(methods[i])))
                 contestants.push_back(contestant_of(problem, methods[i], tolerance, kernels[i], together));
     return contestants;
 }
