@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // lobatto.h on lobatto.hpp: scenes, trajectories step by step, runs and sweeps.
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "library/handles.hpp"
@@ -276,7 +278,11 @@ lobatto_sweep* lobatto_sweep_run(const lobatto_scene* scene, const lobatto_setti
     return api::made<lobatto_sweep>([&](lobatto_sweep& sweep) {
         api::Starts starts;
         starts.count = count;
-        for (size_t c = 0; c < columns; ++c) starts.columns[names[c]].assign(values[c], values[c] + count);
+        for (size_t c = 0; c < columns; ++c) {
+            if (starts.columns.contains(names[c]))
+                throw api::InputError(fmt::format("the column '{}' is given twice", names[c]));
+            starts.columns[names[c]].assign(values[c], values[c] + count);
+        }
         api::SweepOptions options;
         static_cast<api::Settings&>(options) = api::settings_of(settings);
         options.measure = false;  // as lobatto.h says

@@ -54,9 +54,11 @@ std::vector<Required> required_of(const lobatto::Scene& scene) {
 
 void check_change(const std::vector<Required>& required, const std::vector<double>& parameters, std::size_t first,
                   std::size_t count) {
+    constexpr double least = 1e-300, most = 1e300;
     for (std::size_t i = first; i < first + count; ++i)
-        if (!std::isfinite(parameters[i]))
-            throw InputError(fmt::format("{} is no value of a parameter", parameters[i]));
+        if (const double size = std::fabs(parameters[i]); !(size == 0 || (size >= least && size <= most)))
+            throw InputError(fmt::format(
+                "{} is no value of a parameter: it must be 0, or of a size between 1e-300 and 1e300", parameters[i]));
     for (const Required& one : required) {
         const double value = one.value(parameters);
         if (!(value > 0 || (one.may_vanish && value == 0))) throw InputError(one.complaint);

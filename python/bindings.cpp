@@ -59,6 +59,13 @@ const double* row_of(const Array& array, std::size_t count, const char* what) {
     return array.data();
 }
 
+// Numbers that are all there.
+Array whole(const py::object& values, const char* what) {
+    if (py::module_::import("numpy.ma").attr("is_masked")(values).cast<bool>())
+        throw lob::InputError(std::string(what) + " has masked values");
+    return values.cast<Array>();
+}
+
 // Whether nobody pressed Ctrl-C, and what the caller's own function says.
 template <class... Arguments>
 std::function<bool(Arguments...)> watched(const py::object& progress) {
@@ -354,14 +361,14 @@ void add_stepper(py::module_& module) {
              "Equal steps while they fit, then a shorter one that ends at t exactly.")
         .def(
             "start",
-            [](lob::Stepper& stepper, double t, const Array& q, const py::object& p, const py::object& velocity) {
+            [](lob::Stepper& stepper, double t, const py::object& q, const py::object& p, const py::object& velocity) {
                 if (p.is_none() == velocity.is_none()) throw lob::InputError("start: give p or velocity, one of them");
                 const std::size_t n = stepper.coordinates();
-                const auto rate = (p.is_none() ? velocity : p).cast<Array>();
+                const Array position = whole(q, "q"), rate = p.is_none() ? whole(velocity, "velocity") : whole(p, "p");
                 if (p.is_none())
-                    stepper.start_from_velocity(t, row_of(q, n, "q"), row_of(rate, n, "velocity"));
+                    stepper.start_from_velocity(t, row_of(position, n, "q"), row_of(rate, n, "velocity"));
                 else
-                    stepper.start(t, row_of(q, n, "q"), row_of(rate, n, "p"));
+                    stepper.start(t, row_of(position, n, "q"), row_of(rate, n, "p"));
             },
             py::arg("t"), py::arg("q"), py::arg("p") = py::none(), py::kw_only(), py::arg("velocity") = py::none(),
             "Another place to go on from: positions, and momenta or velocities.")

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <string_view>
 
 #include "analysis/motion.hpp"
 #include "cli/commands/commands.hpp"
@@ -24,8 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int some_failed = 3;                // exit code
-constexpr std::int64_t smooth_below = 20000;  // steps up to which states between them make curves smooth
+constexpr int some_wrong = 2, some_failed = 3;  // exit codes
+constexpr std::int64_t smooth_below = 20000;    // steps up to which states between them make curves smooth
 constexpr double smaller_ones[] = {0.2, 0.4, 0.6, 0.8};
 
 struct GalleryCommand {
@@ -108,14 +110,39 @@ Picture picture_of_scene(const api::Scene& read) {
     return picture_of(scene, motion.states, nested ? smaller_motions(scene, motion.states) : std::vector<MotionRows>{});
 }
 
+// Pictures have names of their own, and nothing that is not ours stands in their place.
+void check_places(const std::vector<std::string>& paths, const std::string& folder) {
+    std::map<std::string, std::string> path_of;
+    keep_foreign(folder + "/README.md", "`lobatto gallery`");
+    for (const std::string& path : paths) {
+        const std::string picture = folder + "/" + result_name(path) + ".svg";
+        if (const auto [place, is_new] = path_of.try_emplace(picture, path); !is_new)
+            throw InputError(fmt::format("{} and {}: both pictures would be {}; draw them into two folders",
+                                         place->second, path, picture));
+        keep_foreign(picture);
+    }
+}
+
+// A text that Markdown takes for nothing else.
+std::string in_markdown(const std::string& text) {
+    std::string safe;
+    for (const char c : text) {
+        if (std::string_view("\\`*_[]<>").find(c) != std::string_view::npos) safe += '\\';
+        safe += c;
+    }
+    return safe;
+}
+
 void gallery(const GalleryCommand& options) {
     const std::vector<std::string> paths = options.scenes.empty() ? all_scenes() : options.scenes;
     output_folder(options.folder, "");
+    check_places(paths, options.folder);
     std::string page =
         "# Gallery\n\n"
         "Every scene of this folder's pictures is a short text file; `lobatto gallery` derived, compiled and ran each "
         "and drew\nwhat came out. Click a title for the scene.\n";
     std::size_t failed = 0;
+    bool is_input_alone = true;  // at fault
     std::vector<Drawn> drawn;
     Progress progress(std::ssize(paths));
     for (const std::string& path : paths) {
@@ -130,15 +157,15 @@ void gallery(const GalleryCommand& options) {
             if (!options.json)
                 fmt::print("{:<44}{:>4} kB  {}\n", (fs::path(options.folder) / svg).generic_string(),
                            (bytes + 999) / 1000, picture.caption);
-            page +=
-                fmt::format("\n## [{}]({})\n{}\n\n![{}]({})\n", scene.title(),
-                            fs::relative(path, options.folder).generic_string(), picture.caption, scene.title(), svg);
+            page += fmt::format("\n## [{0}]({1})\n{2}\n\n![{0}]({3})\n", in_markdown(scene.title()),
+                                fs::relative(path, options.folder).generic_string(), picture.caption, svg);
         } catch (const MachineError&) {
             throw;
         } catch (const api::MachineError&) {
             throw;
         } catch (const std::runtime_error& failure) {
             ++failed;
+            is_input_alone = is_input_alone && dynamic_cast<const api::InputError*>(&failure) != nullptr;
             tell("{}\n", failure.what());
         }
     }
@@ -148,7 +175,7 @@ void gallery(const GalleryCommand& options) {
     else
         fmt::print("{} of {} scenes drawn; {}/README.md shows them.\n", paths.size() - failed, paths.size(),
                    options.folder);
-    if (failed > 0) throw ExitCode{some_failed};
+    if (failed > 0) throw ExitCode{is_input_alone ? some_wrong : some_failed};
 }
 
 }  // namespace

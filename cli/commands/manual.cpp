@@ -30,6 +30,7 @@ void write_manual(const CommandLine& program, const ManualCommand& options) {
     }
     output_folder(options.folder, "");
     const auto pages = manual_pages(program);
+    for (const auto& [name, text] : pages) keep_foreign(options.folder + "/" + name);
     for (const auto& [name, text] : pages) write_whole(options.folder + "/" + name, "the page", text);
     fmt::print("{} pages in {}; read them with `man {}/lobatto.1`\n", pages.size(), options.folder, options.folder);
 }

@@ -177,7 +177,7 @@ void merge(const MergeOptions& options) {
             "lobatto: warning: {} was computed on another kind of processor, or by another compiler, than the first of "
             "the parts; last digits may differ from those of one process.\n",
             parts.rounds_otherwise());
-    if (options.quiet || options.output == standard_output) return;
+    if (options.quiet || is_standard_output(options.output)) return;
     print_row("shards", fmt::format("{}", parts.count()));
     print_row("trajectories",
               fmt::format("{}{}", parts.trajectories(), failed == 0 ? "" : fmt::format(", {} failed", failed)));

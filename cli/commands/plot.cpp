@@ -88,6 +88,10 @@ void plot(const PlotCommand& options) {
         if (!std::filesystem::exists(beside))
             throw InputError(fmt::format("--events: there is no {}; a run whose scene has events writes it", beside));
         events.push_back(read_number_table(beside));
+        const std::string &origin = tables.back().origin, &other = events.back().origin;
+        if (!origin.empty() && !other.empty() && origin != other)
+            throw InputError(fmt::format("--events: {} is of another run than {} ({}not {}); run the scene again",
+                                         beside, file, other, origin.substr(0, origin.size() - 2)));
     }
     PlotRequest request;
     request.x = options.x.empty() ? tables.front().columns.front().name : options.x;

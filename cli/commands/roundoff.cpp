@@ -32,14 +32,16 @@ struct RoundoffCommand {
     bool no_reference = false, no_picture = false, json = false;
 };
 
+const std::string table_head =
+    "steps,plain mean of H,plain rms of H,plain rms of q,clean mean of H,clean rms of H,clean rms of q\n";
+
 // Nothing where there is no number.
 std::string in_csv(double value) {
     return std::isfinite(value) ? fmt::format("{:.6e}", value) : "";
 }
 
 std::string csv_of(const RoundoffResult& result) {
-    std::string text =
-        "steps,plain mean of H,plain rms of H,plain rms of q,clean mean of H,clean rms of H,clean rms of q\n";
+    std::string text = table_head;
     for (std::size_t i = 0; i < result.plain.rows.size(); ++i) {
         const RoundoffRow &plain = result.plain.rows[i], &clean = result.clean.rows[i];
         text +=
@@ -99,6 +101,8 @@ void roundoff(const RoundoffCommand& options) {
     const std::string folder = output_folder(options.output, result_name(scene.path) + "_roundoff"),
                       table = folder + "/roundoff.csv";
     keep_scene(path, table);
+    keep_foreign(table, "steps,plain mean of h");
+    if (!options.no_picture) keep_foreign(folder + "/roundoff.svg");
     const Interruption interruption;
     std::optional<Progress> progress(std::in_place, options.steps * options.trajectories);
     const RoundoffResult result =

@@ -42,6 +42,9 @@ void tradeoff(const TradeoffOptions& options) {
     end_of(scene);
     const std::string folder = output_folder(options.output, result_name(scene.path) + ".tradeoff");
 
+    keep_foreign(folder + "/tradeoff.csv", "family,points,precision");
+    for (const char* name : {"tradeoff.json", "report.html", "work_precision.svg", "error.svg", "energy.svg"})
+        keep_foreign(folder + "/" + name);
     const Interruption interruption;
     Say say(seconds);
     ExperimentRequest request;

@@ -176,7 +176,7 @@ void view(const ViewCommand& options) {
         if (!options.video.empty())
             drawn.push_back({options.scenes.front(), all.front().title, "video", options.video, ""});
         fmt::print("{}", json_of_drawn("view", path, drawn));
-    } else if (!options.quiet) {
+    } else if (!options.quiet && !is_standard_output(path)) {
         for (const Viewed& one : all)
             print_row("motion", fmt::format("{}: {}; {}, {}", one.motion.label, one.motion.note,
                                             counted(std::ssize(one.motion.times), "frame", "frames"),

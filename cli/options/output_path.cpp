@@ -44,13 +44,9 @@ std::string result_name(const std::string& scene) {
     return std::filesystem::path(scene).stem().string();
 }
 
-bool is_standard_output(const std::string& path) {
-    return path == standard_output || path == "/dev/stdout" || path == "/dev/fd/1" || path == "/proc/self/fd/1";
-}
-
 void keep_scene(const std::string& scene, const std::string& path) {
     std::error_code none;
-    if (path == standard_output) return;
+    if (is_standard_output(path)) return;
     // Regular files only: a terminal is good as both.
     for (const char* ending : {"", ".partial", ".checkpoint"})
         if (std::filesystem::is_regular_file(path + ending, none) &&
@@ -59,20 +55,34 @@ void keep_scene(const std::string& scene, const std::string& path) {
                 fmt::format("{}: the result would overwrite the scene {}; give it another name", path, scene));
 }
 
-void keep_foreign(const std::string& path) {
-    constexpr std::size_t looked_at = 4096;  // bytes: all text that Lobatto writes names it in its first lines
-    std::error_code none;
-    if (path == standard_output || !std::filesystem::is_regular_file(path, none)) return;
+namespace {
+
+// In lower case: all text that Lobatto writes, and the head of its HDF5 files, names it there.
+std::string begin_of(const std::string& path) {
+    constexpr std::size_t looked_at = 4096;  // bytes
     std::string begin(looked_at, '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), static_cast<std::streamsize>(looked_at));
     begin.resize(static_cast<std::size_t>(file.gcount()));
     std::transform(begin.begin(), begin.end(), begin.begin(), [](unsigned char c) { return std::tolower(c); });
-    // Binary files do not name the program that wrote them: files of these formats may be overwritten.
-    const bool names_nobody = begin.starts_with("\x93numpy") || begin.starts_with("\x89hdf") ||
-                              begin.starts_with("\x89png") || begin.starts_with("gif8") || begin.find("ftyp") == 4;
-    if (!begin.empty() && begin.find("lobatto") == std::string::npos && begin.find("gnuplot") == std::string::npos &&
-        !names_nobody)
+    return begin;
+}
+
+}  // namespace
+
+void keep_foreign(const std::string& path, const std::string& mark) {
+    std::error_code none;
+    if (is_standard_output(path) || !std::filesystem::is_regular_file(path, none)) return;
+    const std::string begin = begin_of(path);
+    const auto holds = [](const std::string& text, const std::string& part) {
+        return text.find(part) != std::string::npos;
+    };
+    // Pictures do not name the program that wrote them: they may be overwritten. What an array is of stands beside it.
+    const bool names_nobody =
+        begin.starts_with("\x89png") || begin.starts_with("gif8") || begin.substr(0, 8).ends_with("ftyp");
+    const bool is_ours = holds(begin, mark) || (begin.starts_with("<?xml") && holds(begin, "gnuplot")) ||
+                         (begin.starts_with("\x93numpy") && holds(begin_of(path + ".json"), "lobatto"));
+    if (!begin.empty() && !is_ours && !names_nobody)
         throw InputError(fmt::format(
             "{} is there, and Lobatto did not write it. Move it away, or choose another place with -o", path));
 }

@@ -17,14 +17,12 @@ std::string output_folder(const std::string& given, const std::string& name);
 // How the scene's results are named by default: as its file, without the ending.
 std::string result_name(const std::string& scene);
 
-// "-", and what stands for the same.
-bool is_standard_output(const std::string& path);
-
 // InputError when `path`, where a result is to go, is the scene itself.
 void keep_scene(const std::string& scene, const std::string& path);
 
-// InputError where a file that is not ours stands in the place of a result.
-void keep_foreign(const std::string& path);
+// InputError where a file that is not ours stands in the place of a result. `mark`: in lower case, what the beginning
+// of ours has.
+void keep_foreign(const std::string& path, const std::string& mark = "lobatto");
 
 // --json: what a command reports as JSON, by its schema in docs/schemas/.
 Option add_json_option(Command& command, bool& json);

@@ -26,10 +26,17 @@ namespace {
     throw InputError(fmt::format("{}: {}", path, why));
 }
 
+// Of the head of a table: "kernel" and its value.
+void read_fact(std::string_view what, std::string_view value, NumberTable& table) {
+    if (what == "scene") table.title = value;
+    if (what == "method" || what == "kernel" || what == "parameters") table.origin += fmt::format("{}; ", value);
+}
+
 // "# columns: t, x [m]": the units.
-void read_units(std::string_view comment, NumberTable& table) {
+void read_comment(std::string_view comment, NumberTable& table) {
     constexpr std::string_view mark = "columns: ";
-    if (comment.starts_with("scene: ")) table.title = comment.substr(7);
+    if (const std::size_t end = comment.find(": "); end != std::string_view::npos)
+        read_fact(comment.substr(0, end), comment.substr(end + 2), table);
     if (!comment.starts_with(mark)) return;
     comment.remove_prefix(mark.size());
     for (std::string_view cell : cells_of(comment)) {
@@ -53,7 +60,7 @@ NumberTable from_csv(const std::string& path, const std::string& text) {
         ++number;
         if (line.ends_with('\r')) line.remove_suffix(1);
         if (line.starts_with('#')) {
-            read_units(line.substr(std::min<std::size_t>(2, line.size())), table);
+            read_comment(line.substr(std::min<std::size_t>(2, line.size())), table);
             continue;
         }
         if (line.empty()) continue;
@@ -113,8 +120,7 @@ NumberTable from_hdf5(const std::string& path) {
             }
             ++c;
         }
-        for (const auto& [what, value] : reader.head().facts)
-            if (what == "scene") table.title = value;
+        for (const auto& [what, value] : reader.head().facts) read_fact(what, value, table);
     } catch (const MachineError& error) {
         throw InputError(error.what());
     }

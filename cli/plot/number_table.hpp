@@ -15,6 +15,7 @@ struct NumberTable {
     std::string path;
     std::string title;  // of the scene, where the file tells it
     std::vector<Column> columns;
+    std::string origin = {};  // method, kernel and parameters of the run, where the file tells them
 
     // The column of a name; x[3] is x_3. InputError with the names that there are.
     const Column& column(const std::string& name) const;

@@ -9,6 +9,7 @@
 
 #include "cli/table/hdf5_file.hpp"
 #include "generator/formula/text/source.hpp"
+#include "runtime/files/partial_file.hpp"
 #include "runtime/run/output.hpp"
 
 namespace lobatto {
@@ -28,9 +29,9 @@ void append_binary(std::string& block, TableCell cell) {
 
 TableFormat table_format(const std::string& path) {
     std::error_code none;
-    const bool is_stream =
-        path == "-" || (std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none) &&
-                        !std::filesystem::is_directory(path, none));
+    const bool is_stream = is_standard_output(path) ||
+                           (std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none) &&
+                            !std::filesystem::is_directory(path, none));
     if (is_stream || path.ends_with(".csv")) return TableFormat::csv;
     if (path.ends_with(".npy")) return TableFormat::npy;
     if (path.ends_with(".h5")) {

@@ -61,7 +61,8 @@ def sweep(scene, starts, *, keep=(), threads=0, measure=True, beyond_horizon=Fal
     """
     scene = _scene(scene)
     columns = _columns(starts)
-    values = _lobatto.sweep(scene, columns, list(keep), threads, measure, beyond_horizon, progress, **settings)
+    kept = [keep] if isinstance(keep, str) else list(keep)
+    values = _lobatto.sweep(scene, columns, kept, threads, measure, beyond_horizon, progress, **settings)
     for warning in values["warnings"]:
         warnings.warn(warning, stacklevel=2)
     return Sweep(scene, values)

@@ -59,6 +59,10 @@ bool is_foreign(int descriptor) {
 
 }  // namespace
 
+bool is_standard_output(const std::string& path) {
+    return path == standard_output || path == "/dev/stdout" || path == "/dev/fd/1" || path == "/proc/self/fd/1";
+}
+
 std::optional<std::string> read_whole(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     if (!file) return std::nullopt;
@@ -101,7 +105,7 @@ PartialFile::PartialFile(const std::string& path, const std::string& what, std::
                          const std::string& otherwise, Place place)
     : path_(path), what_(what), otherwise_(otherwise) {
     struct stat status {};
-    if (path == standard_output) {
+    if (is_standard_output(path)) {
         partial_ = path_ = "standard output";
         descriptor_ = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 0);
         if (descriptor_ < 0) fail(path_, errno);
@@ -235,6 +239,8 @@ void PartialFile::write_at_begin(std::string_view bytes) {
 }
 
 void PartialFile::finish() {
+    struct stat before {};  // the new file may be read by whom the old one could be
+    if (partial_ != path_ && stat(path_.c_str(), &before) == 0) fchmod(descriptor_, before.st_mode & 0777);
     if (partial_ != path_ && std::rename(partial_.c_str(), path_.c_str()) != 0) fail(path_, errno);
     const int descriptor = std::exchange(descriptor_, -1);
     if (close(descriptor) != 0) fail(path_, errno);

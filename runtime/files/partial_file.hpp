@@ -9,7 +9,8 @@
 
 namespace lobatto {
 
-inline const char* const standard_output = "-";  // as a path
+inline const char* const standard_output = "-";    // as a path
+bool is_standard_output(const std::string& path);  // that, and what stands for the same
 inline const char* const elsewhere = "choose another place with -o";
 
 // MachineError: "cannot write `what` to PATH: No space left on device. Free some space, or `otherwise`".

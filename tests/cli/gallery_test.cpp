@@ -64,6 +64,28 @@ TEST_CASE("a scene that fails is reported without stopping the others") {
     CHECK(!test::contains(test::read_file(folder / "out/README.md"), "Escape"));
 }
 
+TEST_CASE("a gallery overwrites no page and no picture that is not its own") {
+    const test::TemporaryFolder folder;
+    const auto refused = [&](const std::vector<std::string>& scenes, const std::string& why) {
+        const test::Finished done = gallery(folder.string(), scenes);
+        CHECK(done.exit_code == 2);
+        CHECK_MESSAGE(test::contains(done.err, why), done.err);
+    };
+    for (const char* name : {"README.md", "pendulum.svg"}) {
+        test::write_text(folder / name, "my own work with Lobatto and gnuplot\n");
+        const bool is_page = name == std::string("README.md");
+        if (!is_page) test::write_text(folder / name, "<svg>mine</svg>");
+        const std::string before = test::read_file(folder / name);
+        refused({scene_path("pendulum")}, std::string(name) + " is there, and Lobatto did not write it");
+        CHECK(test::read_file(folder / name) == before);
+        std::filesystem::remove(folder / name);
+    }
+    refused({scene_path("pendulum"), folder / "pendulum.toml"}, "both pictures would be");
+    const std::string wrong = folder / "wrong.toml";
+    test::write_text(wrong, "lagrangian = \"x'^2/2\"\n");
+    refused({wrong}, wrong + ":1:1: a scene has no coordinates");
+}
+
 TEST_CASE("what is drawn is told by the shape of the scene") {
     const auto shape = [](const std::string& name) { return shape_of(read_scene(scene_path(name))); };
     CHECK(shape("pendulum") == Shape::phase);

@@ -65,6 +65,10 @@ TEST_CASE("events are marked, and several files stand in one picture") {
     CHECK(plot_script({table}, {}, {"t", {{"y"}}}, true).find("points pt 6") == std::string::npos);
     CHECK(plot_script({table, table}, {}, {"t", {{"y"}}}, true).find("title 'bouncing_ball'") != std::string::npos);
     CHECK(plot({ran(folder, "kepler"), "--events"}).exit_code == 2);
+    std::filesystem::copy(folder / "bouncing_ball.events.csv", folder / "kepler.events.csv");
+    const test::Finished others = plot({folder / "kepler.csv", "--events"});
+    CHECK(others.exit_code == 2);
+    CHECK_MESSAGE(test::contains(others.err, "kepler.events.csv is of another run than"), others.err);
 }
 
 TEST_CASE("both axes have one scale where they are lengths of one body, and nowhere else") {

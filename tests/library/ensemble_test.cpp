@@ -75,7 +75,8 @@ TEST_CASE("a parameter that is set for each trajectory acts from the next step o
           "unknown parameter 'omga'; declared: m, omega. Did you mean 'omega'?");
     CHECK(input_error_of([&] { ensemble.advance(-1); }) == "advance: -1 is no number of steps");
     const double wrong[] = {9, std::nan(""), 9};
-    CHECK(input_error_of([&] { ensemble.set("omega", wrong); }) == "nan is no value of a parameter");
+    CHECK(input_error_of([&] { ensemble.set("omega", wrong); }) ==
+          "nan is no value of a parameter: it must be 0, or of a size between 1e-300 and 1e300");
     lob::Ensemble balls(lob::Scene(scenes + "bouncing_ball.toml"), {2, {{"y", {1, 2}}}});
     const double bouncy[] = {0.5, -1};
     CHECK(input_error_of([&] { balls.set("e", bouncy); }).find("is not within 0 to 1") != std::string::npos);

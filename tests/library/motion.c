@@ -90,6 +90,11 @@ static void turn(const char* path) {
     sweep = lobatto_sweep_run(scene, &each, 2, 1, names, values);
     check(lobatto_sweep_states_first(sweep) == NULL && lobatto_sweep_states_q(sweep) == NULL, "none were asked for");
     lobatto_sweep_free(sweep);
+    const char* const twice[] = {"q", "q"};
+    const double* const both[] = {starts, starts};
+    sweep = lobatto_sweep_run(scene, &each, 2, 2, twice, both);
+    check(lobatto_sweep_status(sweep) == 2, "one of two columns of a name would be lost");
+    lobatto_sweep_free(sweep);
     lobatto_scene_free(scene);
 }
 

@@ -11,7 +11,8 @@
 /// Units are those of the scene. Arrays of several states are row-major: state i, coordinate k is [i * n + k].
 /// Every function throws Error when it cannot do what it promises; the texts are those of the command line.
 /// Reading, deriving and destroying scenes takes a lock of the whole process; objects of different threads are free
-/// otherwise. One object must not be used by two threads at a time, unless all that is called is const.
+/// otherwise. One object must not be used by two threads at a time, unless all that is called is const. An object that
+/// was moved from may be assigned to or destroyed, and nothing else.
 ///
 /// This header, and the library, are GPL-2.0-or-later, because GiNaC is. The C++ that `lobatto emit` writes is MIT, and
 /// needs neither.

@@ -132,6 +132,10 @@ TEST_CASE("--tolerance takes the place of the scene's, and a loose one costs dig
     const std::string in_scene = place.run({scene, "-o", place.file("scene.csv")}).out;
     place.run({scene, "--tolerance", "1e-15", "-o", place.file("over.csv")});
     CHECK(test::contains(option, "1.00 per step"));
+    CHECK(test::contains(option, "symplectic defect       not exact: steps are iterated to 1e-06 only"));
+    // A linear map is not iterated, whatever the tolerance.
+    const std::string linear = place.run({oscillator, "--tolerance", "1e-6", "-o", place.file("linear.csv")}).out;
+    CHECK(!test::contains(linear, "not exact"));
     CHECK(test::contains(in_scene, "1.00 per step"));
     const double rounding = energy_error(place, "rounding.csv"), loose = energy_error(place, "option.csv");
     CHECK(rounding < 1e-7);        // 6.4e-8, the method's own error
@@ -358,7 +362,7 @@ TEST_CASE("a reader that goes away does not cost the trajectory") {
         {"sh", "-c",
          "'" LOBATTO_PROGRAM "' run '" + pendulum + "' --quiet --until 1e5 -o /dev/stdout | head -7 | tail -1"});
     CHECK(head.out == "t,q,p_q,H\n");
-    const std::string gone = "lobatto: cannot write the trajectory to /dev/stdout: Broken pipe. Its reader has gone\n";
+    const std::string gone = "lobatto: cannot write the trajectory to standard output: Broken pipe. Its reader has gone\n";
     CHECK(head.err == gone);
     // Nor is the error lost when there is more to say on the same pipe.
     const test::Finished talkative =
@@ -620,6 +624,25 @@ TEST_CASE("files that Lobatto did not write are never touched") {
         std::filesystem::remove(scene);
     }
     refused("w.csv", "time,position\n0,1\n", 2);
+    // An array of one's own: nothing beside it says that it is ours.
+    const std::string array = place.file("w.npy");
+    test::write_text(array, "\x93NUMPY and so on");
+    CHECK(place.run({pendulum, "-o", array, "--until", "1"}).exit_code == 2);
+    CHECK(test::read_file(array) == "\x93NUMPY and so on");
+    std::filesystem::remove(array);
+    for (int i = 0; i < 2; ++i) CHECK(place.run({pendulum, "-o", array, "--until", "1"}).exit_code == 0);
+    CHECK(test::run({LOBATTO_PROGRAM, "stability", pendulum, "--chart", array}).exit_code == 2);  // no .svg
+    test::write_text(place.file("mine.svg"), "<svg/>");
+    const test::Finished chart = test::run({LOBATTO_PROGRAM, "stability", pendulum, "--chart", place.file("mine.svg")});
+    CHECK(test::contains(chart.err, "mine.svg is there, and Lobatto did not write it"));
+    const std::string folder = place.file("results");
+    std::filesystem::create_directory(folder);
+    for (const auto& [command, result] : {std::pair("roundoff", "roundoff.csv"), {"tradeoff", "tradeoff.csv"}}) {
+        test::write_text(folder + "/" + result, "mine");
+        const test::Finished done = test::run({LOBATTO_PROGRAM, command, pendulum, "-o", folder});
+        CHECK(done.exit_code == 2);
+        CHECK(test::contains(done.err, std::string(result) + " is there, and Lobatto did not write it"));
+    }
     // Nor under the names that a command chooses itself: of events, of support headers.
     const std::string scene = place.file("events.toml");
     test::write_text(scene,
