@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <optional>
 #include <stdexcept>
 
@@ -117,6 +118,8 @@ StartTable read_starts(const Scene& scene, const std::string& path) {
     if (!is_csv && !path.ends_with(".npy"))
         throw InputError(
             fmt::format("--starts: {} has an ending that is not known; starts are read from .csv and .npy", path));
+    if (std::error_code none; std::filesystem::is_fifo(path, none))  // it may wait for its writer for ever
+        throw InputError(fmt::format("--starts: {} is a named pipe; give a file", path));
     const std::optional<std::string> whole = read_whole(path);
     if (!whole) throw InputError(fmt::format("--starts: cannot read {}: {}", path, std::strerror(errno)));
     const std::string& content = *whole;

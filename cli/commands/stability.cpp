@@ -100,7 +100,9 @@ void add_stability(CommandLine& program) {
     const auto options = std::make_shared<StabilityCommand>();
     Command command = program.command(
         "stability", "Say exactly which steps keep linear motion bounded, and what a scene's step does");
-    command.option("SCENE", options->scene, "Scene file (default: none, every member of both families)");
+    command.option(
+        "SCENE", options->scene,
+        "Scene file; it is looked at in double, without a clock (default: none, every member of both families)");
     options->method.add_to(command);
     add_step_option(command, options->overrides);
     add_set_option(command, options->overrides);

@@ -13,13 +13,11 @@
 #include <cctype>
 #include <cerrno>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <memory>
 #include <utility>
 
 #include "runtime/error.hpp"
@@ -55,6 +53,16 @@ bool is_foreign(int descriptor) {
     const ssize_t count = ::pread(descriptor, begin, sizeof begin, 0);
     const std::string_view there(begin, count < 0 ? 0 : static_cast<std::size_t>(count));
     return !there.empty() && !there.starts_with(text) && !there.starts_with(numpy);
+}
+
+// Through symbolic links, also to where there is nothing yet.
+std::filesystem::path behind_links(std::filesystem::path path) {
+    constexpr int most = 40;
+    std::error_code none;
+    for (int i = 0; i < most && std::filesystem::is_symlink(path, none); ++i)
+        path = path.parent_path() / std::filesystem::read_symlink(path, none);
+    const std::filesystem::path there = std::filesystem::canonical(path, none);
+    return none ? path : there;
 }
 
 }  // namespace
@@ -114,9 +122,7 @@ PartialFile::PartialFile(const std::string& path, const std::string& what, std::
         descriptor_ = open(path.c_str(), O_WRONLY | O_CLOEXEC);
         if (descriptor_ < 0) fail(path_, errno);
     } else {
-        const std::unique_ptr<char, void (*)(void*)> target(realpath(path.c_str(), nullptr),
-                                                            std::free);  // through symbolic links
-        if (target) path_ = target.get();
+        path_ = behind_links(path);
         partial_ = path_ + ".partial";
         descriptor_ = place == Place::free ? open_free() : open_locked();
         keep(kept);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What the trajectories of a sweep begin with: files, draws, lists that run together, settings of the method.
 #include <doctest/doctest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <cstring>
@@ -115,6 +116,8 @@ TEST_CASE("a file of starts that makes no sense is refused with its place") {
     CHECK(npy(npy_of("'<f8'", "(1, 2)", bytes_of<double>({1, std::nan("")}))) ==
           "s.npy: row 0 of the column q' is no finite number\n");
     CHECK(place.refusal("no.csv", {"--starts", place.file("none.csv")}).ends_with("No such file or directory\n"));
+    REQUIRE(::mkfifo(place.file("pipe.csv").c_str(), 0600) == 0);
+    CHECK(place.refusal("no.csv", {"--starts", place.file("pipe.csv")}).ends_with("is a named pipe; give a file\n"));
     CHECK(place.refusal("no.csv", {"--starts", "starts.txt"}) ==
           "--starts: starts.txt has an ending that is not known; starts are read from .csv and .npy\n");
 }

@@ -140,6 +140,11 @@ TEST_CASE("a symbolic link keeps pointing at what it pointed at") {
     CHECK(error_of(folder / "link.csv") == "no error");
     CHECK(std::filesystem::is_symlink(folder / "link.csv"));
     CHECK(test::read_trajectory(folder / "target.csv").rows.size() == 2);
+    // Also at what is not there yet.
+    std::filesystem::create_symlink("new.csv", folder / "to_new.csv");
+    CHECK(error_of(folder / "to_new.csv") == "no error");
+    CHECK(std::filesystem::is_symlink(folder / "to_new.csv"));
+    CHECK(test::read_trajectory(folder / "new.csv").rows.size() == 2);
 }
 
 TEST_CASE("two runs cannot write one file at the same time") {
