@@ -71,7 +71,7 @@ Explored explored(const ChangedScene& scene, const ExperimentRequest& request) {
     Explored found;
     try {
         found.experiment = std::make_unique<Experiment>(scene.written, scene.changed, request);
-        explore(*found.experiment);
+        found.unmeasured = explore(*found.experiment);
     } catch (const Interrupted&) {
         found.interrupted = true;
     } catch (const lobatto::ComputationError& failure) {

@@ -60,6 +60,7 @@ ChangedScene measurable(const Scene& scene, const Settings& settings, const std:
 // What accuracy costs, over the family.
 struct Explored {
     std::unique_ptr<Experiment> experiment;  // none where it was interrupted before its reference was known
+    std::vector<Member> unmeasured = {};     // for want of time
     bool interrupted = false;
 };
 Explored explored(const ChangedScene& scene, const ExperimentRequest& request);

@@ -131,7 +131,7 @@ std::vector<Member> first_of_tour() {
     return {members.begin(), members.begin() + 6};
 }
 
-void explore(Experiment& experiment) {
+std::vector<Member> explore(Experiment& experiment) {
     KernelBuilder& kernel_builder = experiment.kernel_builder();
     const double all = experiment.request().seconds, reserve = 0.12 * all;
     double last_order = 0.25 * all;  // what is ordered later would not be used
@@ -171,6 +171,7 @@ void explore(Experiment& experiment) {
         }
     }
     kernel_builder.cancel();
+    return waiting;
 }
 
 }  // namespace lobatto

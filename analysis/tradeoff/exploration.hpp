@@ -8,8 +8,9 @@
 
 namespace lobatto {
 
-// Returns when time is up or all has been seen; what it measured is in the experiment's store.
-void explore(Experiment& experiment);
+// Returns when time is up or all has been seen: the members for which there was no time. What it measured is in the
+// experiment's store.
+std::vector<Member> explore(Experiment& experiment);
 std::vector<Member> first_of_tour();  // the kernels it begins with
 
 // Of all in the store those than which no other is both faster and more accurate; from coarse to fine.

@@ -34,6 +34,17 @@ void write(const std::string& path, const std::string& text) {
     write_whole(path, "the result", text);
 }
 
+// "Gauss, 4 stages in double; ..."
+std::string names_of(const std::vector<Member>& members) {
+    constexpr std::size_t most = 4;
+    std::vector<std::string> names;
+    for (const Member& member : members)
+        if (names.size() < most)
+            names.push_back(fmt::format("{} in {}", Candidate{member, 0, 0}.name(), precision_name(member.precision)));
+    const std::int64_t others = std::ssize(members) - std::ssize(names);
+    return fmt::format("{}{}", fmt::join(names, "; "), others == 0 ? "" : " and " + counted(others, "other", "others"));
+}
+
 void tradeoff(const TradeoffOptions& options) {
     const double seconds = options.budget.seconds();
     const api::ChangedScene scenes =
@@ -53,7 +64,7 @@ void tradeoff(const TradeoffOptions& options) {
     request.first = first_of_tour();
     request.interrupted = interruption.flag();
     request.say = [&](const std::string& what) { say(what); };
-    const auto [begun, interrupted] = api::explored(scenes, request);
+    const auto [begun, unmeasured, interrupted] = api::explored(scenes, request);
     say.clear();
     if (interrupted && (!begun || begun->store().all().empty())) {
         tell("lobatto: interrupted before anything was measured; what an earlier run measured is kept.\n");
@@ -69,6 +80,9 @@ void tradeoff(const TradeoffOptions& options) {
             counted(std::ssize(experiment.store().all()), "measurement", "measurements"),
             experiment.store().found() > 0 ? fmt::format(" ({} of an earlier run)", experiment.store().found()) : "",
             experiment.until(), experiment.elapsed(), reference_text(experiment), front_table(experiment));
+    if (!options.json && !unmeasured.empty())
+        fmt::print("\nNot measured within {:.3g} s: {}. With more time (--budget) they may be better.\n", seconds,
+                   names_of(unmeasured));
     write(folder + "/tradeoff.csv", csv_of(experiment));
     const std::string json = json_of(experiment);
     write(folder + "/tradeoff.json", json);
