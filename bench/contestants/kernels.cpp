@@ -175,8 +175,7 @@ Contestant contestant_of(const Problem& problem, Method method, double tolerance
         }
         return run(h, steps, trajectories);
     };
-    const std::string name = fmt::format("{}{}{}", method.name(), is_clean(method) ? ", clean" : "",
-                                         tolerance > 0 ? fmt::format(", to {:.0e}", tolerance) : "");
+    const std::string name = method.name() + (tolerance > 0 ? fmt::format(", to {:.0e}", tolerance) : "");
     Contestant contestant{name, method.order(), true, true, Ladder::steps, race};
     contestant.cold_start = [&problem, method, together] { return cold_start_seconds(problem, method, together, ""); };
     return contestant;

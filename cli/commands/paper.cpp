@@ -23,6 +23,8 @@ struct PaperOptions {
 
 void validate(const PaperOptions& options) {
     output_folder(options.folder + (options.figures ? "/paper" : ""), "");
+    const std::string path = options.folder + "/paper.md";
+    keep_foreign(path);
     Say now;
     now("checking every formula");
     std::vector<paper::Finding> findings;
@@ -60,7 +62,6 @@ void validate(const PaperOptions& options) {
         say(growth_lines(figures));
         document += figure_document(figures);
     }
-    const std::string path = options.folder + "/paper.md";
     write_whole(path, "the document", document);
     say(fmt::format(
         "\nWritten: {}{}\n", path,

@@ -85,9 +85,12 @@ void plot(const PlotCommand& options) {
         tables.push_back(read_number_table(file));
         const std::string beside = events_beside(file);
         if (!options.events) continue;
+        if (tables.back().kind == "sweep")
+            throw InputError(
+                fmt::format("--events: {} is the table of a sweep; the events of a run can be marked", file));
         if (!std::filesystem::exists(beside))
             throw InputError(fmt::format("--events: there is no {}; a run whose scene has events writes it", beside));
-        events.push_back(read_number_table(beside));
+        events.push_back(read_number_table(beside, true));
         const std::string &origin = tables.back().origin, &other = events.back().origin;
         if (!origin.empty() && !other.empty() && origin != other)
             throw InputError(fmt::format("--events: {} is of another run than {} ({}not {}); run the scene again",

@@ -50,7 +50,8 @@ TrajectoryHeader header_of(const Scene& scene, const KernelSource& source, const
     const bool whole = !request.whole_q.empty();
     const int parts = whole ? static_cast<int>(request.whole_step.size()) : 1;
     header.method = fmt::format(
-        "{}, h = {}{}{}", scene.method.name(), decimal_text(whole ? request.whole_step.data() : &request.step, parts),
+        "{}, h = {}{}{}{}", scene.method.name(), decimal_text(whole ? request.whole_step.data() : &request.step, parts),
+        request.tolerance > 0 ? fmt::format(", to {}", request.tolerance) : "",
         scene.clock ? ", clock = " + scene.clock->text : "",
         scene.method.numbers == Precision::double_ ? "" : ", in " + precision_name(scene.method.numbers));
     header.kernel = source.digest;
@@ -326,6 +327,7 @@ void run(const RunOptions& options) {
     const bool has_events = !scene.reported().empty();
     keep_scene(scene.path, path);
     keep_foreign(path);
+    if (format_of(options) == TableFormat::npy) keep_foreign(path + ".json");
     if (has_events) {
         keep_scene(scene.path, event_path(options, scene));
         keep_foreign(event_path(options, scene));

@@ -54,6 +54,7 @@ void tradeoff(const TradeoffOptions& options) {
     const std::string folder = output_folder(options.output, result_name(scene.path) + ".tradeoff");
 
     keep_foreign(folder + "/tradeoff.csv", "family,points,precision");
+    keep_foreign(folder + "/measurements.jsonl", " to t = ");
     for (const char* name : {"tradeoff.json", "report.html", "work_precision.svg", "error.svg", "energy.svg"})
         keep_foreign(folder + "/" + name);
     const Interruption interruption;

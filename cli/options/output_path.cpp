@@ -57,9 +57,9 @@ void keep_scene(const std::string& scene, const std::string& path) {
 
 namespace {
 
-// In lower case: all text that Lobatto writes, and the head of its HDF5 files, names it there.
+// In lower case: all text that Lobatto writes names it in its first lines, HDF5 in one of its first blocks.
 std::string begin_of(const std::string& path) {
-    constexpr std::size_t looked_at = 4096;  // bytes
+    const std::size_t looked_at = path.ends_with(".h5") ? 1 << 20 : 4096;  // bytes
     std::string begin(looked_at, '\0');
     std::ifstream file(path, std::ios::binary);
     file.read(begin.data(), static_cast<std::streamsize>(looked_at));
@@ -78,9 +78,12 @@ void keep_foreign(const std::string& path, const std::string& mark) {
         return text.find(part) != std::string::npos;
     };
     // Pictures do not name the program that wrote them: they may be overwritten. What an array is of stands beside it.
-    const bool names_nobody =
-        begin.starts_with("\x89png") || begin.starts_with("gif8") || begin.substr(0, 8).ends_with("ftyp");
-    const bool is_ours = holds(begin, mark) || (begin.starts_with("<?xml") && holds(begin, "gnuplot")) ||
+    const bool names_nobody = (path.ends_with(".png") && begin.starts_with("\x89png")) ||
+                              (path.ends_with(".gif") && begin.starts_with("gif8")) ||
+                              (path.ends_with(".mp4") && begin.substr(0, 8).ends_with("ftyp"));
+    const bool is_table = path.ends_with(".csv") && mark == "lobatto";
+    const bool is_ours = (is_table ? begin.starts_with("# lobatto ") : holds(begin, mark)) ||
+                         (begin.starts_with("<?xml") && holds(begin, "produced by gnuplot")) ||
                          (begin.starts_with("\x93numpy") && holds(begin_of(path + ".json"), "lobatto"));
     if (!begin.empty() && !is_ours && !names_nobody)
         throw InputError(fmt::format(

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstring>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 
@@ -29,12 +30,16 @@ namespace {
 // Of the head of a table: "kernel" and its value.
 void read_fact(std::string_view what, std::string_view value, NumberTable& table) {
     if (what == "scene") table.title = value;
-    if (what == "method" || what == "kernel" || what == "parameters") table.origin += fmt::format("{}; ", value);
+    if (what == "kind") table.kind = value;
+    if (what == "method" || what == "kernel" || what == "parameters")
+        table.origin += fmt::format("{}; ", value);
 }
 
 // "# columns: t, x [m]": the units.
 void read_comment(std::string_view comment, NumberTable& table) {
     constexpr std::string_view mark = "columns: ";
+    constexpr std::string_view kind = "lobatto ";
+    if (comment.starts_with(kind)) read_fact("kind", comment.substr(kind.size()), table);
     if (const std::size_t end = comment.find(": "); end != std::string_view::npos)
         read_fact(comment.substr(0, end), comment.substr(end + 2), table);
     if (!comment.starts_with(mark)) return;
@@ -98,6 +103,10 @@ NumberTable from_npy(const std::string& path, const std::string& text) {
     } catch (const std::invalid_argument& error) {
         refuse(path, error.what());
     }
+    const auto facts = nlohmann::json::parse(read_whole(path + ".json").value_or(""), nullptr, false);
+    for (const char* what : {"kind", "scene", "method", "kernel", "parameters"})
+        if (facts.is_object() && facts.contains(what) && facts[what].is_string())
+            read_fact(what, facts[what].get<std::string>(), table);
     return table;
 }
 
@@ -152,7 +161,7 @@ const NumberTable::Column& NumberTable::column(const std::string& name) const {
            fmt::format("there is no column '{}'; there are {}.{}", name, listing(names), suggestion(wanted, names)));
 }
 
-NumberTable read_number_table(const std::string& path) {
+NumberTable read_number_table(const std::string& path, bool may_be_empty) {
     const std::optional<std::string> whole = read_whole(path);
     if (!whole) refuse(path, fmt::format("cannot read it: {}", std::strerror(errno)));
     const std::string& text = *whole;
@@ -160,7 +169,7 @@ NumberTable read_number_table(const std::string& path) {
                         : text.starts_with("\x93NUMPY") ? from_npy(path, text)
                                                         : from_csv(path, text);
     table.path = path;
-    if (table.columns.front().values.empty()) refuse(path, "there are no rows in it");
+    if (table.columns.front().values.empty() && !may_be_empty) refuse(path, "there are no rows in it");
     return table;
 }
 

@@ -15,7 +15,8 @@ struct NumberTable {
     std::string path;
     std::string title;  // of the scene, where the file tells it
     std::vector<Column> columns;
-    std::string origin = {};  // method, kernel and parameters of the run, where the file tells them
+    std::string kind = {};    // "trajectory", "events", "sweep", likewise
+    std::string origin = {};  // method, kernel and parameters of the run, likewise
 
     // The column of a name; x[3] is x_3. InputError with the names that there are.
     const Column& column(const std::string& name) const;
@@ -23,7 +24,8 @@ struct NumberTable {
     bool has(const std::string& name) const;
 };
 
-// InputError where it cannot be read, or is no table of numbers: which line, and what stands there.
-NumberTable read_number_table(const std::string& path);
+// InputError where it cannot be read, or is no table of numbers: which line, and what stands there; also where it has
+// no row, unless it `may_be_empty`.
+NumberTable read_number_table(const std::string& path, bool may_be_empty = false);
 
 }  // namespace lobatto

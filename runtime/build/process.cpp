@@ -71,18 +71,20 @@ struct Child {
     pid_t parent;
 
     [[noreturn]] void lead() const {
+        ::setpgid(0, 0);
         for (const int signal : {SIGINT, SIGQUIT, SIGPIPE, SIGCHLD, SIGHUP, SIGXFSZ}) std::signal(signal, SIG_DFL);
         std::signal(SIGTERM, [](int) { ::kill(0, SIGKILL); });
         sigset_t none;
         sigemptyset(&none);
         ::sigprocmask(SIG_SETMASK, &none, nullptr);
-        ::setpgid(0, 0);
         ::prctl(PR_SET_PDEATHSIG, SIGTERM);
         if (::getppid() != parent) ::_exit(127);  // it died before the line above
-        const pid_t program = ::fork();
+        const pid_t program = ::_Fork();          // without what libraries do at a fork
         if (program == 0) become_program();
         if (program < 0) report_error();
-        ::close_range(3, ~0U, 0);  // the ends of our pipes, and the caller's files, whose locks it would hold
+        ::close(output);
+        ::close(error_report);
+        ::close_range(3, ~0U, 0);  // and the caller's files, whose locks it would hold
         int status = 0;
         while (::waitpid(program, &status, 0) < 0 && errno == EINTR) {
         }

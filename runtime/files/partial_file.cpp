@@ -65,6 +65,12 @@ std::filesystem::path behind_links(std::filesystem::path path) {
     return none ? path : there;
 }
 
+// A new file may be read by whom the old one could be.
+mode_t mode_of(const std::string& path) {
+    struct stat status {};
+    return stat(path.c_str(), &status) == 0 ? status.st_mode & 0666 : 0666;
+}
+
 }  // namespace
 
 bool is_standard_output(const std::string& path) {
@@ -139,8 +145,9 @@ void PartialFile::fail(const std::string& path, int error) const {
 
 // The partial file, ours alone: opened and locked.
 int PartialFile::open_locked() const {
+    const mode_t mode = mode_of(path_);
     while (true) {
-        const int descriptor = open(partial_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+        const int descriptor = open(partial_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, mode);
         if (descriptor < 0) fail(partial_, errno);
         if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
             const int error = errno;
@@ -168,9 +175,10 @@ int PartialFile::open_locked() const {
 }
 
 int PartialFile::open_free() {
+    const mode_t mode = mode_of(path_);
     const std::string first = partial_;
     for (int number = 1;; ++number) {
-        const int descriptor = open(partial_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
+        const int descriptor = open(partial_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, mode);
         if (descriptor >= 0) return descriptor;
         if (errno != EEXIST || number > 1000) fail(partial_, errno);
         partial_ = first + "." + std::to_string(number);
@@ -245,8 +253,6 @@ void PartialFile::write_at_begin(std::string_view bytes) {
 }
 
 void PartialFile::finish() {
-    struct stat before {};  // the new file may be read by whom the old one could be
-    if (partial_ != path_ && stat(path_.c_str(), &before) == 0) fchmod(descriptor_, before.st_mode & 0777);
     if (partial_ != path_ && std::rename(partial_.c_str(), path_.c_str()) != 0) fail(path_, errno);
     const int descriptor = std::exchange(descriptor_, -1);
     if (close(descriptor) != 0) fail(path_, errno);

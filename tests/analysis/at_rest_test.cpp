@@ -117,7 +117,7 @@ TEST_CASE("a coordinate that rests, but for the error of steps, loses no motion"
                          scene.folder / "sweep.csv", "--quiet"})
                   .exit_code == 0);
     }
-    // Not so what a pulse moves, in time or in space, or an instability.
+    // Not so what a pulse moves, in time or in space, or an instability, also beside one in a far smaller unit.
     for (const char* text :
          {"time = \"t\"\nlagrangian = \"(x'^2 + z'^2)/2 - 0.04*x^2/2 + 5e-4*z*exp(-((t - 7.5)/0.05)^2)\"\n"
           "[coordinates]\nx = { position = 1, velocity = 0 }\nz = { position = 0, velocity = 0 }\n"
@@ -127,6 +127,9 @@ TEST_CASE("a coordinate that rests, but for the error of steps, loses no motion"
           "[method]\npoints = 3\n[run]\nstep = 1\nuntil = 20\n",
           "lagrangian = \"(x'^2 + z'^2)/2 - 0.04*x^2/2 + z^2/2\"\n[coordinates]\n"
           "x = { position = 1, velocity = 0 }\nz = { position = 4e-9, velocity = 0 }\n"
+          "[method]\nfamily = \"gauss\"\nstages = 1\n[run]\nstep = 1\nuntil = 12\n",
+          "lagrangian = \"(x'^2 + z'^2)/2 - 0.01*x^2/2 - (cos(z) - 1)\"\n[coordinates]\n"
+          "x = { position = 2e9, velocity = 0 }\nz = { position = 1e-6, velocity = 0 }\n"
           "[method]\nfamily = \"gauss\"\nstages = 1\n[run]\nstep = 1\nuntil = 12\n"}) {
         INFO(text);
         CHECK(MeasuredScene(text).run().exit_code == 3);

@@ -257,18 +257,6 @@ TEST_CASE("the unit of a conserved momentum makes no difference to an error") {
     CHECK(error_with("3e20") == doctest::Approx(error).epsilon(1e-3));
 }
 
-TEST_CASE("a run whose clock makes ever smaller steps is given up") {
-    const Scene scene = scene_of(kepler_text(0.9, "points = 5", 2));
-    ExperimentRequest wish;
-    wish.seconds = 3600;
-    wish.wanted = 1e-11;
-    Experiment experiment(scene, scene, wish);
-    // Steps of two thirds of a revolution fall into the sun.
-    const Measurement m = experiment.measure(
-        {{Family::lobatto, 3, Precision::double_, StepArithmetic::plain, StepClock::automatic}, 3, 0}, false);
-    CHECK_FALSE((m.complete && m.error < 0.1));
-}
-
 TEST_CASE("a clock that tells no times apart is not tried") {
     const Scene scene = scene_of(kepler_text(0.05, "points = 5", 1));
     ExperimentRequest wish;

@@ -12,6 +12,8 @@ namespace {
 constexpr double part_of_step = 1.0 / 16;  // that is a part of the amplitude of all motions that a step resolves
 constexpr double nowhere = 1e-6;           // of what it goes in a step
 constexpr double at_rest = 0x1p-46;        // of the largest pace or amplitude of its kind: rounding
+constexpr double last_digits = 0x1p-50;    // of a number
+constexpr double noisy = 16;               // times what they change: rounding
 constexpr double slight_part = 0.01;       // of the largest amplitude of its kind
 constexpr double slight_product = 1e-5;    // of amplitudes of position and momentum, which does not depend on units
 constexpr double shrinks = 1.3;            // by as much with 2/3 of the step, at least: an error of steps
@@ -34,14 +36,15 @@ std::vector<double> pace_at(LoadedStepper<double>& stepper, double step, const s
     if (stepper.velocity(row[0], q, p, pace) != LOBATTO_OK) return {};
     stepper.slopes(row[0], q, pace, Lv, Lq);
     pace.insert(pace.end(), Lq.begin(), Lq.end());
-    for (double& one : pace) one = std::fabs(one * step);
+    for (double& one : pace) one *= step;
     return pace;
 }
 
 void widen_by_pace(std::vector<double>& amplitudes, const std::vector<bool>& meets_wall,
                    const std::vector<double>& pace) {
     for (std::size_t k = 0; k < pace.size() / 2; ++k)
-        if (meets_wall[k] && amplitudes[k] < nowhere * pace[k]) amplitudes[k] = part_of_step * pace[k];
+        if (const double way = std::fabs(pace[k]); meets_wall[k] && amplitudes[k] < nowhere * way)
+            amplitudes[k] = part_of_step * way;
 }
 
 std::vector<bool> slight(const std::vector<double>& amplitudes) {
@@ -56,6 +59,28 @@ std::vector<bool> slight(const std::vector<double>& amplitudes) {
     return result;
 }
 
+namespace {
+
+// Whether coordinate k has no pace but rounding at a state: none, or one that is another where all other coordinates
+// move by their last digits.
+bool begins_at_rest(LoadedStepper<double>& stepper, double step, const std::vector<double>& row,
+                    const std::vector<double>& pace, std::size_t k) {
+    const std::size_t n = pace.size() / 2;
+    if (pace[k] == 0 && pace[n + k] == 0) return true;
+    double apart[2] = {0, 0};
+    for (const double sign : {1.0, -1.0}) {
+        std::vector<double> shaken = row;
+        for (std::size_t i = 0; i < 2 * n; ++i)
+            if (i % n != k) shaken[1 + i] *= 1 + (i % 2 == 0 ? sign : -sign) * last_digits;
+        const std::vector<double> other = pace_at(stepper, step, shaken);
+        if (other.empty()) return false;
+        for (const std::size_t i : {k, n + k}) apart[i / n] = std::fmax(apart[i / n], std::fabs(other[i] - pace[i]));
+    }
+    return std::fabs(pace[k]) <= noisy * apart[0] && std::fabs(pace[n + k]) <= noisy * apart[1];
+}
+
+}  // namespace
+
 std::vector<bool> rests_beside(LoadedStepper<double>& stepper, double step, const Rows& rows,
                                const std::vector<double>& amplitudes, const std::vector<bool>& asked) {
     const std::size_t n = asked.size();
@@ -64,14 +89,17 @@ std::vector<bool> rests_beside(LoadedStepper<double>& stepper, double step, cons
     if (first.empty()) return rests;
     double largest[2] = {0, 0};
     for (std::size_t i = 0; i < 2 * n; ++i)
-        largest[i / n] = std::fmax(largest[i / n], std::fmax(first[i], amplitudes[i]));
+        largest[i / n] = std::fmax(largest[i / n], std::fmax(std::fabs(first[i]), amplitudes[i]));
     for (std::size_t k = 0; k < n; ++k) {
-        rests[k] = asked[k] && first[k] <= at_rest * largest[0] && first[n + k] <= at_rest * largest[1];
+        rests[k] = asked[k] && std::fabs(first[k]) <= at_rest * largest[0] &&
+                   std::fabs(first[n + k]) <= at_rest * largest[1] &&
+                   begins_at_rest(stepper, step, rows.front(), first, k);
         for (std::size_t j = 1; j < rows.size() && rests[k]; ++j) {
             std::vector<double> row = rows[j];
             for (const std::size_t i : {k, n + k}) row[1 + i] = rows.front()[1 + i];
             const std::vector<double> pace = pace_at(stepper, step, row);
-            rests[k] = !pace.empty() && pace[k] < amplitudes[k] && pace[n + k] < amplitudes[n + k];
+            rests[k] =
+                !pace.empty() && std::fabs(pace[k]) < amplitudes[k] && std::fabs(pace[n + k]) < amplitudes[n + k];
         }
     }
     return rests;

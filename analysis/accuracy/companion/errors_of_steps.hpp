@@ -17,8 +17,8 @@ std::vector<bool> stands_in_walls(const Scene& scene);
 // States t, q, p of a run, its start first.
 using Rows = std::vector<std::vector<double>>;
 
-// How far each number would go in a step at the pace of a state, q then p. Empty where the state is refused. `stepper`
-// is prepared.
+// How far each number would go in a step at the pace of a state, q then p, with its sign. Empty where the state is
+// refused. `stepper` is prepared.
 std::vector<double> pace_at(LoadedStepper<double>& stepper, double step, const std::vector<double>& row);
 
 // Between walls a body may be at one place after each step, of the run and of the companion. Where a position of these,
