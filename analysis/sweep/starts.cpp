@@ -60,6 +60,7 @@ SweepStarts::SweepStarts(const Scene& scene, const StartsRequest& request, std::
         assembled_ = build_system(scene);
     }
     find_dependents();
+    check_orientations();
 }
 
 // The lists of settings, or the others. Those that run together are one dimension, which counts as one of settings
@@ -183,6 +184,30 @@ void SweepStarts::find_dependents() {
     for (std::size_t k = 0; k < scene_.coordinates.size(); ++k) {
         put(Role::position, k, scene_.initial_position[k], "the initial position of ", base_.q, exact_base_.q);
         put(Role::rate, k, scene_.initial_rate[k], rate, base_.rate, exact_base_.rate);
+    }
+}
+
+// The rate of a quaternion tells an angular velocity only beside it. Where its parts are varied alone, a body that
+// turns would turn otherwise.
+void SweepStarts::check_orientations() const {
+    const auto coordinate_of = [&](const GiNaC::symbol& position) {
+        return static_cast<std::size_t>(std::find_if(scene_.coordinates.begin(), scene_.coordinates.end(),
+                                                     [&](const Coordinate& one) { return one.position == position; }) -
+                                        scene_.coordinates.begin());
+    };
+    for (const auto& quaternion : scene_.quaternions) {
+        std::optional<std::size_t> varied, turning;
+        for (const GiNaC::symbol& part : quaternion) {
+            const std::size_t k = coordinate_of(part);
+            if (k == scene_.coordinates.size()) continue;
+            if (varies(Role::position, k)) varied = k;
+            if (!varies(Role::rate, k) && base_.rate[k] != 0) turning = k;
+        }
+        if (varied && turning)
+            throw InputError(fmt::format(
+                "'{}' is a part of an orientation, and the rate of {} would stay, so that the body turned otherwise; "
+                "vary a parameter that its `orientation` is a formula of",
+                scene_.coordinates[*varied].written, scene_.coordinates[*turning].written));
     }
 }
 

@@ -97,6 +97,7 @@ private:
     void add(const VariedName& name, const std::string& written, Values values);
     void count_all();
     void find_dependents();
+    void check_orientations() const;
     std::int64_t place(std::int64_t trajectory, std::size_t column) const;
     GiNaC::numeric exact(std::int64_t trajectory, std::size_t column) const;
     void assemble(const std::vector<GiNaC::ex>& parameters, EnsembleStart& start, Exact& exact) const;

@@ -82,7 +82,7 @@ void keep_foreign(const std::string& path, const std::string& mark) {
                               (path.ends_with(".gif") && begin.starts_with("gif8")) ||
                               (path.ends_with(".mp4") && begin.substr(0, 8).ends_with("ftyp"));
     const bool is_table = path.ends_with(".csv") && mark == "lobatto";
-    const bool is_ours = (is_table ? begin.starts_with("# lobatto ") : holds(begin, mark)) ||
+    const bool is_ours = (is_table ? begin.starts_with("# lobatto") : holds(begin, mark)) ||
                          (begin.starts_with("<?xml") && holds(begin, "produced by gnuplot")) ||
                          (begin.starts_with("\x93numpy") && holds(begin_of(path + ".json"), "lobatto"));
     if (!begin.empty() && !is_ours && !names_nobody)

@@ -31,8 +31,7 @@ namespace {
 void read_fact(std::string_view what, std::string_view value, NumberTable& table) {
     if (what == "scene") table.title = value;
     if (what == "kind") table.kind = value;
-    if (what == "method" || what == "kernel" || what == "parameters")
-        table.origin += fmt::format("{}; ", value);
+    if (what == "method" || what == "kernel" || what == "parameters") table.origin += fmt::format("{}; ", value);
 }
 
 // "# columns: t, x [m]": the units.

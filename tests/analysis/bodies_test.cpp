@@ -69,6 +69,18 @@ TEST_CASE("plane bodies on hinges are the double pendulum in angles, those on a 
     CHECK(std::fabs(cart[1] - by_hand[1]) < 1e-12);
 }
 
+TEST_CASE("a torque on a body is a force on its quaternion, as the documents say") {
+    // About its axis 3 a body at rest turns by tau t^2/(2 I).
+    const std::vector<double> q = end_of(
+        "lagrangian = \"0\"\n[bodies]\ntop = { mass = 1, inertia = [0.75, 0.6, 0.5], orientation = [3, 0, 0, 4] }\n"
+        "[forces]\n\"top.q[1]\" = \"-2*top.q[4]*tau3\"\n\"top.q[2]\" = \"2*top.q[3]*tau3\"\n"
+        "\"top.q[3]\" = \"-2*top.q[2]*tau3\"\n\"top.q[4]\" = \"2*top.q[1]*tau3\"\n[parameters]\ntau3 = 0.1\n");
+    const double half = std::atan2(4, 3) + 0.1 * 9 / (2 * 0.5) / 2;
+    REQUIRE(q.size() == 7);
+    CHECK(q[3] == doctest::Approx(std::cos(half)).epsilon(1e-9));
+    CHECK(q[6] == doctest::Approx(std::sin(half)).epsilon(1e-9));
+}
+
 TEST_CASE("a hinge in space leaves one angle, with the moment of inertia about its axis") {
     // About (0, 3, 4)/5 through the origin: J = e I e + m d^2, d the distance of (1, 0, 0).
     const std::vector<double> hinge = end_of(

@@ -19,6 +19,8 @@ struct GalerkinConstraints : GalerkinNewton<K> {
     static constexpr int multiplier_room = constraints > 0 ? constraints : 1;
 
 private:
+    real longest_step{};  // of those that starts were for
+
     struct Masses {
         real of[K::mass_entries > 0 ? K::mass_entries : 1];
     };
@@ -29,11 +31,11 @@ private:
     }
     // How far positions go in a step; one that a constraint holds fixed, as far as the others, in the metric of the
     // mass.
-    void way_in_step(const real& time, const real* at, const real* v, real* way, Masses& M) const {
+    void way_in_step(const real& time, const real& h, const real* at, const real* v, real* way, Masses& M) const {
         real momentum_there[n], moved = real(0);  // sum M_kk (h v_k)^2
         Formulas<K>::legendre(coefficients, time, at, v, momentum_there, M.of);
-        each_mass(M, [&](int k, real mass) { moved += mass * (step_size * v[k]) * (step_size * v[k]); });
-        for (int k = 0; k < n; ++k) way[k] = fabs(step_size * v[k]);
+        each_mass(M, [&](int k, real mass) { moved += mass * (h * v[k]) * (h * v[k]); });
+        for (int k = 0; k < n; ++k) way[k] = fabs(h * v[k]);
         each_mass(M, [&](int k, real mass) { way[k] += sqrt(moved / mass); });
     }
 
@@ -49,14 +51,16 @@ private:
     }
 
 protected:
-    // Whether a start keeps the constraints, to half of the digits; v, mu: its velocity and multipliers.
-    Status check_constraints(const real* v, const real* mu) const {
+    // Whether a start keeps the constraints, to half of the digits; v, mu: its velocity and multipliers. After a switch
+    // it is what a whole step has left, however little of that step is to come.
+    Status check_constraints(const real* v, const real* mu) {
         if constexpr (constraints > 0) {
+            longest_step = maximum(longest_step, fabs(step_size));
             real phi[constraints], phi_t[constraints], G[K::constraint_entries], size[constraints], force[n], way[n];
             Masses M;
             Formulas<K>::constraint(coefficients, this->time(), q, phi, phi_t, G);
-            way_in_step(this->time(), q, v, way, M);
-            for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
+            way_in_step(this->time(), longest_step, q, v, way, M);
+            for (int c = 0; c < constraints; ++c) size[c] = fabs(longest_step * phi_t[c]);
             for (int k = 0; k < n; ++k) force[k] = real(0);
             for (int e = 0; e < K::constraint_entries; ++e) {
                 const int c = K::constraint_row[e], k = K::constraint_column[e];
@@ -69,7 +73,7 @@ protected:
             for (int k = 0; k < n; ++k) {
                 largest = fabs(p[k]) > largest ? fabs(p[k]) : largest;
                 apart = fabs(force[k]) > apart ? fabs(force[k]) : apart;
-                pushed = fabs(step_size * Lq[k]) > pushed ? fabs(step_size * Lq[k]) : pushed;
+                pushed = maximum(pushed, fabs(longest_step * Lq[k]));
             }
             const real rounding = real(64) * Limits<real>::epsilon * pushed;  // at rest steps leave that
             if (!(apart <= Limits<real>::root_epsilon * largest + rounding)) return Status::off_constraints;
@@ -84,7 +88,7 @@ protected:
         real size[multiplier_room], reach[n];
         Masses M;
         for (int c = 0; c < constraints; ++c) size[c] = fabs(step_size * phi_t[c]);
-        way_in_step(this->next_time(), q1, v, reach, M);
+        way_in_step(this->next_time(), step_size, q1, v, reach, M);
         for (int k = 0; k < n; ++k) reach[k] += fabs(q[k]) + fabs(q1[k]);
         each_mass(M, [&](int k, real mass) {
             for (int b = 0; b < active; ++b)

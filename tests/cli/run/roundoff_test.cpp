@@ -254,12 +254,13 @@ TEST_CASE(
         return run({LOBATTO_PROGRAM, "roundoff", LOBATTO_SOURCE_DIR "/scenes/pendulum.toml", "--steps", "100",
                     "--trajectories", "2", "--no-reference", "--no-picture", "-o", where});
     };
-    write_text(folder / "roundoff.csv", "of before\n");
+    const std::string of_before = "steps,plain mean of H, of before\n";
+    write_text(folder / "roundoff.csv", of_before);
     std::filesystem::create_hard_link(folder / "roundoff.csv", folder / "before");
     const Finished done = measure(folder.string());
     CHECK_MESSAGE(done.exit_code == 0, done.err);
-    CHECK(read_file(folder / "roundoff.csv").starts_with("steps,plain mean of H"));
-    CHECK(read_file(folder / "before") == "of before\n");
+    CHECK(read_file(folder / "roundoff.csv").starts_with("steps,plain mean of H,"));
+    CHECK(read_file(folder / "before") == of_before);
 
     const Finished refused = measure(folder / "before");
     CHECK(refused.exit_code == 4);

@@ -362,7 +362,8 @@ TEST_CASE("a reader that goes away does not cost the trajectory") {
         {"sh", "-c",
          "'" LOBATTO_PROGRAM "' run '" + pendulum + "' --quiet --until 1e5 -o /dev/stdout | head -7 | tail -1"});
     CHECK(head.out == "t,q,p_q,H\n");
-    const std::string gone = "lobatto: cannot write the trajectory to standard output: Broken pipe. Its reader has gone\n";
+    const std::string gone =
+        "lobatto: cannot write the trajectory to standard output: Broken pipe. Its reader has gone\n";
     CHECK(head.err == gone);
     // Nor is the error lost when there is more to say on the same pipe.
     const test::Finished talkative =

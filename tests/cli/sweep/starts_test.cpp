@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 #include <sys/stat.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -120,6 +121,25 @@ TEST_CASE("a file of starts that makes no sense is refused with its place") {
     CHECK(place.refusal("no.csv", {"--starts", place.file("pipe.csv")}).ends_with("is a named pipe; give a file\n"));
     CHECK(place.refusal("no.csv", {"--starts", "starts.txt"}) ==
           "--starts: starts.txt has an ending that is not known; starts are read from .csv and .npy\n");
+}
+
+TEST_CASE("a part of an orientation is not varied beside a rate that tells an angular velocity with it") {
+    const test::SweepFolder place;
+    const auto top = [&](const std::string& turn) {
+        test::write_text(
+            place.file("top.toml"),
+            "lagrangian = \"-9.81*top.z\"\n[bodies]\ntop = { mass = 1, inertia = [0.75, 0.75, 0.5], position "
+            "= [0, 0, 0.5]" +
+                turn +
+                " }\n[joints]\ntip = { type = \"ball\", bodies = [\"ground\", \"top\"], point = [0, 0, 0] }\n"
+                "[run]\nstep = 0.05\nuntil = 0.1\n");
+        return test::run({LOBATTO_PROGRAM, "sweep", place.file("top.toml"), "--vary", "top.q[2]=0.1,0.2", "-o",
+                          place.file("top.csv")});
+    };
+    const test::Finished turning = top(", angular_velocity = [0, 0, 8]");
+    CHECK(turning.exit_code == 2);
+    CHECK(test::contains(turning.err, "'top.q[2]' is a part of an orientation, and the rate of top.q[4] would stay"));
+    CHECK(top("").exit_code == 0);
 }
 
 TEST_CASE("random rows are the same for the same seed, for each setting, and others for other rows") {
