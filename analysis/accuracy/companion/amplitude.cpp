@@ -17,6 +17,8 @@ constexpr double displaced = 0.01;  // of its amplitude, at the start: what move
 // squares it each time; a motion that small beside others is none.
 constexpr double held_at_zero = 0x1p-100;
 constexpr double many_roundings = 0x1p-45;  // of the largest amplitude: what starts with more was meant to
+constexpr double part_of_step = 1.0 / 16;   // that is a part of the amplitude of all motions that a step resolves
+constexpr double nowhere = 1e-6;            // of what it goes in a step
 constexpr std::size_t first_compared = 16;  // comparisons: by then other motions are known, if steps are of any use
 
 }  // namespace
@@ -33,6 +35,14 @@ std::vector<int> amplitude_groups(const Scene& scene) {
         groups.push_back(numbers.try_emplace(array, static_cast<int>(numbers.size())).first->second);
     }
     return groups;
+}
+
+std::vector<bool> stands_in_walls(const Scene& scene) {
+    std::vector<bool> held;
+    for (const Coordinate& coordinate : scene.coordinates)
+        held.push_back(std::any_of(scene.impacts.begin(), scene.impacts.end(),
+                                   [&](const Impact& impact) { return impact.when.value.has(coordinate.position); }));
+    return held;
 }
 
 void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count) {
@@ -111,6 +121,13 @@ void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons
         }
         if (i < n && amplitudes[i] == 0) amplitudes[n + i] = 0;
     }
+}
+
+void widen_by_pace(std::vector<double>& amplitudes, const std::vector<bool>& meets_wall,
+                   const std::vector<double>& pace) {
+    for (std::size_t k = 0; k < pace.size() / 2; ++k)
+        if (const double way = std::fabs(pace[k]); meets_wall[k] && amplitudes[k] < nowhere * way)
+            amplitudes[k] = part_of_step * way;
 }
 
 std::vector<double> places_of(const std::vector<double>& least, const std::vector<double>& most,

@@ -24,6 +24,9 @@ double beside(double start);
 // Coordinates whose errors are measured by one amplitude have the same number: those of an array.
 std::vector<int> amplitude_groups(const Scene& scene);
 
+// The coordinates that stand in the formulas of walls.
+std::vector<bool> stands_in_walls(const Scene& scene);
+
 // Takes a row of `count` numbers into a range.
 void widen_to(std::vector<double>& least, std::vector<double>& most, const double* row, std::size_t count);
 
@@ -56,6 +59,12 @@ struct FirstMoves {
 void leave_out_rounding(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& places,
                         double steps, double epsilon, const FirstMoves& first,
                         const std::function<std::pair<double, double>(std::size_t, std::size_t)>& pair);
+
+// Between walls a body may be at one place after each step, of the run and of the companion. Where a position of these,
+// `meets_wall`, goes nowhere and has a velocity, its amplitude becomes a part of what it goes in a step. `pace`: at the
+// start (pace_at, errors_of_steps.hpp).
+void widen_by_pace(std::vector<double>& amplitudes, const std::vector<bool>& meets_wall,
+                   const std::vector<double>& pace);
 
 // What the rounding of numbers in a range is measured by: the largest size of each, or what constraints make of it
 // (constraint_sizes.hpp; empty: there are none).

@@ -9,24 +9,14 @@ namespace lobatto {
 
 namespace {
 
-constexpr double part_of_step = 1.0 / 16;  // that is a part of the amplitude of all motions that a step resolves
-constexpr double nowhere = 1e-6;           // of what it goes in a step
-constexpr double at_rest = 0x1p-46;        // of the largest pace or amplitude of its kind: rounding
-constexpr double last_digits = 0x1p-50;    // of a number
-constexpr double noisy = 16;               // times what they change: rounding
-constexpr double slight_part = 0.01;       // of the largest amplitude of its kind
-constexpr double slight_product = 1e-5;    // of amplitudes of position and momentum, which does not depend on units
-constexpr double shrinks = 1.3;            // by as much with 2/3 of the step, at least: an error of steps
+constexpr double at_rest = 0x1p-46;      // of the largest pace or amplitude of its kind: rounding
+constexpr double last_digits = 0x1p-50;  // of a number
+constexpr double noisy = 16;             // a pace below so many times what the last digits of others change
+constexpr double slight_part = 0.01;     // of the largest amplitude of its kind
+constexpr double slight_product = 1e-5;  // of amplitudes of position and momentum, which does not depend on units
+constexpr double shrinks = 1.3;          // by as much with 2/3 of the step, at least: an error of steps
 
 }  // namespace
-
-std::vector<bool> stands_in_walls(const Scene& scene) {
-    std::vector<bool> held;
-    for (const Coordinate& coordinate : scene.coordinates)
-        held.push_back(std::any_of(scene.impacts.begin(), scene.impacts.end(),
-                                   [&](const Impact& impact) { return impact.when.value.has(coordinate.position); }));
-    return held;
-}
 
 std::vector<double> pace_at(LoadedStepper<double>& stepper, double step, const std::vector<double>& row) {
     const auto begin = row.begin() + 1, middle = begin + (std::ssize(row) - 1) / 2;
@@ -38,13 +28,6 @@ std::vector<double> pace_at(LoadedStepper<double>& stepper, double step, const s
     pace.insert(pace.end(), Lq.begin(), Lq.end());
     for (double& one : pace) one *= step;
     return pace;
-}
-
-void widen_by_pace(std::vector<double>& amplitudes, const std::vector<bool>& meets_wall,
-                   const std::vector<double>& pace) {
-    for (std::size_t k = 0; k < pace.size() / 2; ++k)
-        if (const double way = std::fabs(pace[k]); meets_wall[k] && amplitudes[k] < nowhere * way)
-            amplitudes[k] = part_of_step * way;
 }
 
 std::vector<bool> slight(const std::vector<double>& amplitudes) {

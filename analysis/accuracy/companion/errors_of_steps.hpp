@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// What velocities and forces tell of amplitudes: that errors of steps alone move a coordinate, which then has none, and
-// that a body between walls has one, though it is at one place after each step.
+// Coordinates that errors of steps alone move, as velocities and forces tell: they have no amplitude.
 #pragma once
 
 #include <functional>
 #include <vector>
 
-#include "generator/scene/scene.hpp"
 #include "runtime/build/library.hpp"
 
 namespace lobatto {
-
-// The coordinates that stand in the formulas of walls.
-std::vector<bool> stands_in_walls(const Scene& scene);
 
 // States t, q, p of a run, its start first.
 using Rows = std::vector<std::vector<double>>;
@@ -20,12 +15,6 @@ using Rows = std::vector<std::vector<double>>;
 // How far each number would go in a step at the pace of a state, q then p, with its sign. Empty where the state is
 // refused. `stepper` is prepared.
 std::vector<double> pace_at(LoadedStepper<double>& stepper, double step, const std::vector<double>& row);
-
-// Between walls a body may be at one place after each step, of the run and of the companion. Where a position of these,
-// `meets_wall`, goes nowhere and has a velocity, its amplitude becomes a part of what it goes in a step. `pace`: at the
-// start.
-void widen_by_pace(std::vector<double>& amplitudes, const std::vector<bool>& meets_wall,
-                   const std::vector<double>& pace);
 
 // Which coordinates stay slight beside the others.
 std::vector<bool> slight(const std::vector<double>& amplitudes);
