@@ -28,8 +28,6 @@ struct Member {
 
     Method method(double tolerance = 0) const { return {family, points, tolerance, arithmetic, precision}; }
     int order() const { return method().order(); }
-    // Whether its steps are iterated to a tolerance; of linear systems nothing is, whatever the member.
-    bool iterates() const { return family != Family::splitting && arithmetic == StepArithmetic::plain; }
     auto key() const { return std::tuple(family, points, precision, arithmetic, clock); }
     friend bool operator==(const Member& a, const Member& b) { return a.key() == b.key(); }
     friend bool operator<(const Member& a, const Member& b) { return a.key() < b.key(); }

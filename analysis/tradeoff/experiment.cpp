@@ -206,7 +206,7 @@ double Experiment::fewest_steps(StepClock clock) const {
 
 bool Experiment::heeds_tolerance(const Member& member) const {
     const System& system = kernels_.derivation(member.clock).system;
-    return member.iterates() && !system.linear && !(system.separable && member.precision == Precision::double_double);
+    return lobatto::heeds_tolerance(member.method(), system.linear, system.separable);
 }
 
 double Experiment::stability_limit_of(const Member& member) const {

@@ -54,7 +54,7 @@ public:
     // The numbers of steps that are tried, and the least of them.
     StepLadder ladder(double ratio) const { return {reference_.samples, ratio}; }
     double fewest_steps(StepClock clock) const;
-    // Whether its steps end at a tolerance: others are solved to rounding at no further cost.
+    // Of this scene (generator/method/method.hpp).
     bool heeds_tolerance(const Member& member) const;
     // Of h times the frequency; not a number where none is known: with clocks, constraints and cut steps.
     double stability_limit_of(const Member& member) const;

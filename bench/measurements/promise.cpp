@@ -160,7 +160,7 @@ std::vector<Measurement> brute_force(Experiment& experiment, Cost& cost, double 
     for (const Member& member : members) {
         const Kernel kernel = experiment.kernel_builder().kernel(member);
         for (const double tolerance : {0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4}) {
-            if (tolerance > 0 && !member.iterates()) break;
+            if (tolerance > 0 && !experiment.heeds_tolerance(member)) break;
             int dear = 0, no_better = 0;
             double least = infinity;
             const double fewest = experiment.until() * experiment.reference().frequency / 4;

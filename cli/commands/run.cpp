@@ -136,11 +136,9 @@ std::string defect_text(const PreparedRun& run) {
                                             : "not measured: the first step has no derivative in this precision";
 }
 
-// Whether steps end at the tolerance: linear maps are exact, and the steps of constant masses in double-double are
-// solved to rounding by the one evaluation that they take.
-bool heeds_tolerance(const PreparedRun& run, const TrajectoryRequest& request) {
-    const bool is_refined = run.source.form == Form::separable && run.scene.method.numbers == Precision::double_double;
-    return request.tolerance > 0 && run.kernel->linear == 0 && !is_refined;
+bool ends_at_tolerance(const PreparedRun& run, const TrajectoryRequest& request) {
+    const bool has_constant_masses = run.source.form != Form::general;
+    return request.tolerance > 0 && heeds_tolerance(run.scene.method, run.kernel->linear != 0, has_constant_masses);
 }
 
 void print_table(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
@@ -171,7 +169,7 @@ void print_table(const PreparedRun& run, const TrajectoryRequest& request, const
         print_row("discrete energy error", fmt::format("relative {:.2g} at most", *error));
     if (has_defect(run))
         print_row("symplectic defect",
-                  heeds_tolerance(run, request)
+                  ends_at_tolerance(run, request)
                       ? fmt::format("not exact: steps are iterated to {:.2g} only", request.tolerance)
                   : scene.impacts.empty() ? defect_text(run)
                                           : defect_text(run) + ", of a step without impacts");
@@ -354,7 +352,7 @@ void run(const RunOptions& options) {
     say.clear();
     for (const std::string& warning : verdict.warnings) tell("lobatto: warning: {}.\n", warning);
     if (options.json) {
-        const bool is_exact = has_defect(run) && !heeds_tolerance(run, request) && result.steps_done > 0;
+        const bool is_exact = has_defect(run) && !ends_at_tolerance(run, request) && result.steps_done > 0;
         fmt::print("{}", json_of_run(run, request, result, observers, verdict,
                                      is_exact ? defect_of(run.kernel, scene.method.numbers, scene) : std::nullopt,
                                      {path, has_events ? files.events_path() : ""}));

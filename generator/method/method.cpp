@@ -48,6 +48,11 @@ std::string Method::name() const {
     }
 }
 
+bool heeds_tolerance(const Method& method, bool is_linear, bool has_constant_masses) {
+    return method.family != Family::splitting && method.arithmetic == StepArithmetic::plain && !is_linear &&
+           !(has_constant_masses && method.numbers == Precision::double_double);
+}
+
 std::string reason_against_numbers(const Method& method) {
     const bool is_one_word = method.numbers != Precision::double_double && !has_many_digits(method.numbers);
     if (!is_one_word && method.arithmetic == StepArithmetic::clean)

@@ -30,6 +30,10 @@ struct Method {
     std::string name() const;  // "Lobatto, 4 points", "Gauss, 1 stage", "splitting, 11 stages"
 };
 
+// Whether steps end at the tolerance. Those of splitting methods, in clean arithmetic, of linear systems, and of
+// constant masses in double-double are solved to rounding at no further cost.
+bool heeds_tolerance(const Method& method, bool is_linear, bool has_constant_masses);
+
 // Why a method cannot be computed in its numbers; empty: it can. The coefficients of some are known to few digits.
 std::string reason_against_numbers(const Method& method);
 

@@ -186,11 +186,16 @@ TEST_CASE("what a step costs is counted, and nothing is iterated") {
     for (const int stages : {11, 14}) {
         const Kernel kernel = compiled(derivation_of(henon_heiles, splitting(stages)));
         CHECK(gradients_of(kernel.table(), 0, 10) == 10 * stages);
-        CHECK(!Member{Family::splitting, stages}.iterates());
+        CHECK_FALSE(heeds_tolerance({Family::splitting, stages}, false, true));
     }
     CHECK(gradients_of(compiled(derivation_of(henon_heiles, "points = 4")).table(), 30, 10) == 70);
     CHECK(gradients_of(compiled(derivation_of(henon_heiles, "family = \"gauss\"\nstages = 2")).table(), 30, 10) == 120);
-    CHECK(Member{Family::gauss, 3}.iterates());
+    Method gauss{Family::gauss, 3};
+    CHECK(heeds_tolerance(gauss, false, true));
+    CHECK_FALSE(heeds_tolerance(gauss, true, true));  // a linear system
+    gauss.numbers = Precision::double_double;
+    CHECK(heeds_tolerance(gauss, false, false));
+    CHECK_FALSE(heeds_tolerance(gauss, false, true));
     CHECK(family_in(Precision::double_, true).size() == family_in(Precision::double_, false).size() + 5);
 }
 
