@@ -187,8 +187,8 @@ void SweepStarts::find_dependents() {
     }
 }
 
-// The rate of a quaternion tells an angular velocity only beside it. Where its parts are varied alone, a body that
-// turns would turn otherwise.
+// The rate of a quaternion tells an angular velocity only together with the quaternion. A sweep that varied parts of
+// the quaternion alone would change the angular velocity.
 void SweepStarts::check_orientations() const {
     const auto coordinate_of = [&](const GiNaC::symbol& position) {
         return static_cast<std::size_t>(std::find_if(scene_.coordinates.begin(), scene_.coordinates.end(),
@@ -205,8 +205,8 @@ void SweepStarts::check_orientations() const {
         }
         if (varied && turning)
             throw InputError(fmt::format(
-                "'{}' is a part of an orientation, and the rate of {} would stay, so that the body turned otherwise; "
-                "vary a parameter that its `orientation` is a formula of",
+                "'{}' is a part of an orientation, and the rate of {} would stay, so the angular velocity would "
+                "change; vary a parameter that stands in the formulas of `orientation`",
                 scene_.coordinates[*varied].written, scene_.coordinates[*turning].written));
     }
 }

@@ -26,8 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int some_wrong = 2, some_failed = 3;  // exit codes
-constexpr std::int64_t smooth_below = 20000;    // steps up to which states between them make curves smooth
+constexpr int wrong_input = 2, some_failed = 3;  // exit codes
+constexpr std::int64_t smooth_below = 20000;     // steps up to which states between them make curves smooth
 constexpr double smaller_ones[] = {0.2, 0.4, 0.6, 0.8};
 
 struct GalleryCommand {
@@ -142,7 +142,7 @@ void gallery(const GalleryCommand& options) {
         "Every scene of this folder's pictures is a short text file; `lobatto gallery` derived, compiled and ran each "
         "and drew\nwhat came out. Click a title for the scene.\n";
     std::size_t failed = 0;
-    bool is_input_alone = true;  // at fault
+    bool all_are_input = true;  // what failed
     std::vector<Drawn> drawn;
     Progress progress(std::ssize(paths));
     for (const std::string& path : paths) {
@@ -165,7 +165,7 @@ void gallery(const GalleryCommand& options) {
             throw;
         } catch (const std::runtime_error& failure) {
             ++failed;
-            is_input_alone = is_input_alone && dynamic_cast<const api::InputError*>(&failure) != nullptr;
+            all_are_input = all_are_input && dynamic_cast<const api::InputError*>(&failure) != nullptr;
             tell("{}\n", failure.what());
         }
     }
@@ -175,7 +175,7 @@ void gallery(const GalleryCommand& options) {
     else
         fmt::print("{} of {} scenes drawn; {}/README.md shows them.\n", paths.size() - failed, paths.size(),
                    options.folder);
-    if (failed > 0) throw ExitCode{is_input_alone ? some_wrong : some_failed};
+    if (failed > 0) throw ExitCode{all_are_input ? wrong_input : some_failed};
 }
 
 }  // namespace

@@ -48,9 +48,9 @@ std::string MassEquations::dependent_constraints(const Elimination& singular) co
     }
     if (count == 1)
         return fmt::format(
-            "the constraint {} has no slope: all its derivatives in the coordinates vanish there, as those of x^2 = 0 "
-            "do, or those of what follows from the other constraints; write it so that it has one, as x = 0, or remove "
-            "it",
+            "the constraint {} has no slope: all its derivatives in the coordinates vanish there. If it is written "
+            "like "
+            "x^2 = 0, write x = 0; if it follows from the other constraints, remove it",
             names);
     return fmt::format(
         "the constraints {}{} depend on one another: one of them follows from the others, or contradicts "
