@@ -10,10 +10,6 @@ using lobatto::api::Handle;
 namespace api = lobatto::api;
 
 struct lobatto_integrator : Handle<api::Stepper> {
-    template <class Work>
-    int with_stepper(Work&& work) noexcept {
-        return value ? attempt([&] { return work(*value); }) : status;
-    }
     std::vector<api::EventHit> hits;  // taken last, and as C sees them
     std::vector<lobatto_event> events;
     std::vector<double> multipliers;
@@ -29,6 +25,19 @@ std::vector<lobatto_event> events_of(const std::vector<api::EventHit>& hits) {
     std::vector<lobatto_event> events;
     for (const api::EventHit& hit : hits) events.push_back({hit.kind, hit.t, hit.q.data(), hit.p.data()});
     return events;
+}
+
+const api::Variable* coordinate_of(const lobatto_scene* scene, std::size_t index) {
+    return api::read(scene, nullptr, [&](const auto& value) { return api::element(value.coordinates(), index); });
+}
+const api::Variable* parameter_of(const lobatto_scene* scene, std::size_t index) {
+    return api::read(scene, nullptr, [&](const auto& value) { return api::element(value.parameters(), index); });
+}
+
+template <class Work>
+int with_stepper(lobatto_integrator* integrator, Work&& work) noexcept {
+    if (integrator == nullptr || !integrator->value) return api::status_of(integrator);
+    return integrator->attempt([&] { return work(*integrator->value); });
 }
 
 }  // namespace
@@ -53,55 +62,56 @@ void lobatto_scene_free(lobatto_scene* scene) {
     delete scene;
 }
 int lobatto_scene_status(const lobatto_scene* scene) {
-    return scene->status;
+    return api::status_of(scene);
 }
 const char* lobatto_scene_message(const lobatto_scene* scene) {
-    return scene->message.c_str();
+    return api::message_of(scene);
 }
 const char* lobatto_scene_name(const lobatto_scene* scene) {
-    return scene->value ? scene->value->name().c_str() : nullptr;
+    return api::read(scene, nullptr, [](const auto& value) { return value.name().c_str(); });
 }
 const char* lobatto_scene_title(const lobatto_scene* scene) {
-    return scene->value ? scene->value->title().c_str() : nullptr;
+    return api::read(scene, nullptr, [](const auto& value) { return value.title().c_str(); });
 }
 size_t lobatto_scene_coordinates(const lobatto_scene* scene) {
-    return scene->value ? scene->value->coordinates().size() : 0;
+    return api::read(scene, 0, [](const auto& value) { return value.coordinates().size(); });
 }
 const char* lobatto_scene_coordinate_name(const lobatto_scene* scene, size_t index) {
-    const api::Variable* const found = scene->coordinate(index);
+    const api::Variable* const found = coordinate_of(scene, index);
     return found == nullptr ? nullptr : found->name.c_str();
 }
 const char* lobatto_scene_coordinate_unit(const lobatto_scene* scene, size_t index) {
-    const api::Variable* const found = scene->coordinate(index);
+    const api::Variable* const found = coordinate_of(scene, index);
     return found == nullptr ? nullptr : found->unit.c_str();
 }
 size_t lobatto_scene_parameters(const lobatto_scene* scene) {
-    return scene->value ? scene->value->parameters().size() : 0;
+    return api::read(scene, 0, [](const auto& value) { return value.parameters().size(); });
 }
 const char* lobatto_scene_parameter_name(const lobatto_scene* scene, size_t index) {
-    const api::Variable* const found = scene->parameter(index);
+    const api::Variable* const found = parameter_of(scene, index);
     return found == nullptr ? nullptr : found->name.c_str();
 }
 const char* lobatto_scene_parameter_unit(const lobatto_scene* scene, size_t index) {
-    const api::Variable* const found = scene->parameter(index);
+    const api::Variable* const found = parameter_of(scene, index);
     return found == nullptr ? nullptr : found->unit.c_str();
 }
 double lobatto_scene_parameter_value(const lobatto_scene* scene, size_t index) {
-    const api::Variable* const found = scene->parameter(index);
+    const api::Variable* const found = parameter_of(scene, index);
     return found == nullptr ? 0 : found->value;
 }
 size_t lobatto_scene_inputs(const lobatto_scene* scene) {
-    return scene->value ? scene->value->inputs().size() : 0;
+    return api::read(scene, 0, [](const auto& value) { return value.inputs().size(); });
 }
 const char* lobatto_scene_input_name(const lobatto_scene* scene, size_t index) {
-    const api::Variable* const found = scene->value ? api::element(&scene->value->inputs(), index) : nullptr;
+    const api::Variable* const found =
+        api::read(scene, nullptr, [&](const auto& value) { return api::element(value.inputs(), index); });
     return found == nullptr ? nullptr : found->name.c_str();
 }
 size_t lobatto_scene_events(const lobatto_scene* scene) {
-    return scene->value ? scene->value->events().size() : 0;
+    return api::read(scene, 0, [](const auto& value) { return value.events().size(); });
 }
 const char* lobatto_scene_event_text(const lobatto_scene* scene, size_t index) {
-    return api::text(scene->value ? api::element(&scene->value->events(), index) : nullptr);
+    return api::read(scene, nullptr, [&](const auto& value) { return api::text(value.events(), index); });
 }
 
 lobatto_integrator* lobatto_integrator_new(const lobatto_scene* scene, const lobatto_settings* settings) {
@@ -113,6 +123,7 @@ lobatto_integrator* lobatto_integrator_copy(const lobatto_integrator* integrator
     auto* const copy = new (std::nothrow) lobatto_integrator;
     if (copy == nullptr) return copy;
     const int failed = copy->attempt([&] {
+        if (integrator == nullptr) throw api::InputError("there is no integrator: NULL was given");
         copy->value = integrator->value;
         copy->message = integrator->message;
     });
@@ -123,61 +134,61 @@ void lobatto_integrator_free(lobatto_integrator* integrator) {
     delete integrator;
 }
 int lobatto_integrator_status(const lobatto_integrator* integrator) {
-    return integrator->status;
+    return api::status_of(integrator);
 }
 const char* lobatto_integrator_message(const lobatto_integrator* integrator) {
-    return integrator->message.c_str();
+    return api::message_of(integrator);
 }
 int lobatto_integrator_start(lobatto_integrator* integrator, double t, const double* q, const double* p) {
-    return integrator->with_stepper([&](api::Stepper& stepper) { stepper.start(t, q, p); });
+    return with_stepper(integrator, [&](api::Stepper& stepper) { stepper.start(t, q, p); });
 }
 int lobatto_integrator_start_from_velocity(lobatto_integrator* integrator, double t, const double* q,
                                            const double* velocity) {
-    return integrator->with_stepper([&](api::Stepper& stepper) { stepper.start_from_velocity(t, q, velocity); });
+    return with_stepper(integrator, [&](api::Stepper& stepper) { stepper.start_from_velocity(t, q, velocity); });
 }
 int lobatto_integrator_advance(lobatto_integrator* integrator, int64_t steps) {
-    return integrator->with_stepper([&](api::Stepper& stepper) { return stepper.advance(steps); });
+    return with_stepper(integrator, [&](api::Stepper& stepper) { return stepper.advance(steps); });
 }
 int lobatto_integrator_advance_to(lobatto_integrator* integrator, double t) {
-    return integrator->with_stepper([&](api::Stepper& stepper) { return stepper.advance_to(t); });
+    return with_stepper(integrator, [&](api::Stepper& stepper) { return stepper.advance_to(t); });
 }
 int lobatto_integrator_set(lobatto_integrator* integrator, const char* parameter, double value) {
-    return integrator->with_stepper(
-        [&](api::Stepper& stepper) { stepper.set(parameter == nullptr ? "" : parameter, value); });
+    return with_stepper(integrator,
+                        [&](api::Stepper& stepper) { stepper.set(parameter == nullptr ? "" : parameter, value); });
 }
 int lobatto_integrator_set_inputs(lobatto_integrator* integrator, const double* values) {
-    return integrator->with_stepper([&](api::Stepper& stepper) {
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
         if (values == nullptr) throw api::InputError("set_inputs: NULL was given; give a value for each input");
         stepper.set_inputs(values);
     });
 }
 int lobatto_integrator_velocity(lobatto_integrator* integrator, double* velocity) {
-    return integrator->with_stepper([&](api::Stepper& stepper) {
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
         const std::vector<double> values = stepper.velocity();
         std::copy(values.begin(), values.end(), velocity);
     });
 }
 int lobatto_integrator_at(lobatto_integrator* integrator, double t, double* q, double* velocity) {
-    return integrator->with_stepper([&](api::Stepper& stepper) {
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
         const auto state = stepper.at(t);
         std::copy(state.first.begin(), state.first.end(), q);
         std::copy(state.second.begin(), state.second.end(), velocity);
     });
 }
 int lobatto_integrator_tangent(lobatto_integrator* integrator, double* tangent) {
-    return integrator->with_stepper([&](api::Stepper& stepper) {
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
         const std::vector<double> values = stepper.tangent();
         std::copy(values.begin(), values.end(), tangent);
     });
 }
 int lobatto_integrator_parameter(lobatto_integrator* integrator, const char* parameter, double* value) {
-    return integrator->with_stepper(
-        [&](api::Stepper& stepper) { *value = stepper.parameter(parameter == nullptr ? "" : parameter); });
+    return with_stepper(
+        integrator, [&](api::Stepper& stepper) { *value = stepper.parameter(parameter == nullptr ? "" : parameter); });
 }
 int lobatto_integrator_take_events(lobatto_integrator* integrator, const lobatto_event** events, size_t* count) {
     *events = nullptr;
     *count = 0;
-    return integrator->with_stepper([&](api::Stepper& stepper) {
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
         integrator->hits = stepper.take_events();
         integrator->events = events_of(integrator->hits);
         *events = api::data(integrator->events);
@@ -187,29 +198,29 @@ int lobatto_integrator_take_events(lobatto_integrator* integrator, const lobatto
 int lobatto_integrator_multipliers(lobatto_integrator* integrator, const double** multipliers, size_t* count) {
     *multipliers = nullptr;
     *count = 0;
-    return integrator->with_stepper([&](api::Stepper& stepper) {
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
         integrator->multipliers = stepper.multipliers();
         *multipliers = api::data(integrator->multipliers);
         *count = integrator->multipliers.size();
     });
 }
 size_t lobatto_integrator_coordinates(const lobatto_integrator* integrator) {
-    return integrator->value ? integrator->value->coordinates() : 0;
+    return api::read(integrator, 0, [](const auto& value) { return value.coordinates(); });
 }
 double lobatto_integrator_step_size(const lobatto_integrator* integrator) {
-    return integrator->value ? integrator->value->step_size() : 0;
+    return api::read(integrator, 0, [](const auto& value) { return value.step_size(); });
 }
 double lobatto_integrator_t(const lobatto_integrator* integrator) {
-    return integrator->value ? integrator->value->t() : 0;
+    return api::read(integrator, 0, [](const auto& value) { return value.t(); });
 }
 const double* lobatto_integrator_q(const lobatto_integrator* integrator) {
-    return integrator->value ? integrator->value->q() : nullptr;
+    return api::read(integrator, nullptr, [](const auto& value) { return value.q(); });
 }
 const double* lobatto_integrator_p(const lobatto_integrator* integrator) {
-    return integrator->value ? integrator->value->p() : nullptr;
+    return api::read(integrator, nullptr, [](const auto& value) { return value.p(); });
 }
 double lobatto_integrator_energy(const lobatto_integrator* integrator) {
-    return integrator->value ? integrator->value->energy() : std::nan("");
+    return api::read(integrator, std::nan(""), [](const auto& value) { return value.energy(); });
 }
 
 lobatto_trajectory* lobatto_run(const lobatto_scene* scene, const lobatto_settings* settings, int measure) {
@@ -232,45 +243,45 @@ void lobatto_trajectory_free(lobatto_trajectory* trajectory) {
     delete trajectory;
 }
 int lobatto_trajectory_status(const lobatto_trajectory* trajectory) {
-    return trajectory->status;
+    return api::status_of(trajectory);
 }
 const char* lobatto_trajectory_message(const lobatto_trajectory* trajectory) {
-    return trajectory->message.c_str();
+    return api::message_of(trajectory);
 }
 size_t lobatto_trajectory_count(const lobatto_trajectory* trajectory) {
-    return trajectory->value ? trajectory->value->count : 0;
+    return api::read(trajectory, 0, [](const auto& value) { return value.count; });
 }
 const double* lobatto_trajectory_t(const lobatto_trajectory* trajectory) {
-    return trajectory->value ? api::data(trajectory->value->t) : nullptr;
+    return api::read(trajectory, nullptr, [](const auto& value) { return api::data(value.t); });
 }
 const double* lobatto_trajectory_q(const lobatto_trajectory* trajectory) {
-    return trajectory->value ? api::data(trajectory->value->q) : nullptr;
+    return api::read(trajectory, nullptr, [](const auto& value) { return api::data(value.q); });
 }
 const double* lobatto_trajectory_p(const lobatto_trajectory* trajectory) {
-    return trajectory->value ? api::data(trajectory->value->p) : nullptr;
+    return api::read(trajectory, nullptr, [](const auto& value) { return api::data(value.p); });
 }
 const double* lobatto_trajectory_energy(const lobatto_trajectory* trajectory) {
-    return trajectory->value ? api::data(trajectory->value->energy) : nullptr;
+    return api::read(trajectory, nullptr, [](const auto& value) { return api::data(value.energy); });
 }
 const double* lobatto_trajectory_columns(const lobatto_trajectory* trajectory, size_t* columns) {
-    *columns = trajectory->value ? trajectory->value->column_names.size() : 0;
-    return trajectory->value ? api::data(trajectory->value->columns) : nullptr;
+    *columns = api::read(trajectory, 0, [](const auto& value) { return value.column_names.size(); });
+    return api::read(trajectory, nullptr, [](const auto& value) { return api::data(value.columns); });
 }
 const char* lobatto_trajectory_column(const lobatto_trajectory* trajectory, size_t index) {
-    return api::text(trajectory->value ? api::element(&trajectory->value->column_names, index) : nullptr);
+    return api::read(trajectory, nullptr, [&](const auto& value) { return api::text(value.column_names, index); });
 }
 double lobatto_trajectory_error(const lobatto_trajectory* trajectory) {
-    return trajectory->value ? trajectory->value->error.value_or(std::nan("")) : std::nan("");
+    return api::read(trajectory, std::nan(""), [](const auto& value) { return value.error.value_or(std::nan("")); });
 }
 const lobatto_event* lobatto_trajectory_events(const lobatto_trajectory* trajectory, size_t* count) {
-    *count = trajectory->events.size();
-    return api::data(trajectory->events);
+    *count = trajectory == nullptr ? 0 : trajectory->events.size();
+    return trajectory == nullptr ? nullptr : api::data(trajectory->events);
 }
 size_t lobatto_trajectory_warnings(const lobatto_trajectory* trajectory) {
-    return trajectory->value ? trajectory->value->warnings.size() : 0;
+    return api::read(trajectory, 0, [](const auto& value) { return value.warnings.size(); });
 }
 const char* lobatto_trajectory_warning(const lobatto_trajectory* trajectory, size_t index) {
-    return api::text(trajectory->value ? api::element(&trajectory->value->warnings, index) : nullptr);
+    return api::read(trajectory, nullptr, [&](const auto& value) { return api::text(value.warnings, index); });
 }
 
 lobatto_sweep* lobatto_sweep_run(const lobatto_scene* scene, const lobatto_settings* settings, size_t count,
@@ -293,48 +304,48 @@ void lobatto_sweep_free(lobatto_sweep* sweep) {
     delete sweep;
 }
 int lobatto_sweep_status(const lobatto_sweep* sweep) {
-    return sweep->status;
+    return api::status_of(sweep);
 }
 const char* lobatto_sweep_message(const lobatto_sweep* sweep) {
-    return sweep->message.c_str();
+    return api::message_of(sweep);
 }
 size_t lobatto_sweep_count(const lobatto_sweep* sweep) {
-    return sweep->value ? sweep->value->count : 0;
+    return api::read(sweep, 0, [](const auto& value) { return value.count; });
 }
 const int* lobatto_sweep_statuses(const lobatto_sweep* sweep) {
-    return sweep->value ? sweep->value->status.data() : nullptr;
+    return api::read(sweep, nullptr, [](const auto& value) { return value.status.data(); });
 }
 const char* lobatto_sweep_status_text(const lobatto_sweep* sweep, int status) {
-    return api::text(sweep->value && status >= 0
-                         ? api::element(&sweep->value->statuses, static_cast<std::size_t>(status))
-                         : nullptr);
+    return api::read(sweep, nullptr, [&](const auto& value) {
+        return status < 0 ? nullptr : api::text(value.statuses, static_cast<std::size_t>(status));
+    });
 }
 size_t lobatto_sweep_warnings(const lobatto_sweep* sweep) {
-    return sweep->value ? sweep->value->warnings.size() : 0;
+    return api::read(sweep, 0, [](const auto& value) { return value.warnings.size(); });
 }
 const char* lobatto_sweep_warning(const lobatto_sweep* sweep, size_t index) {
-    return api::text(sweep->value ? api::element(&sweep->value->warnings, index) : nullptr);
+    return api::read(sweep, nullptr, [&](const auto& value) { return api::text(value.warnings, index); });
 }
 const double* lobatto_sweep_t(const lobatto_sweep* sweep) {
-    return sweep->value ? api::data(sweep->value->t) : nullptr;
+    return api::read(sweep, nullptr, [](const auto& value) { return api::data(value.t); });
 }
 const double* lobatto_sweep_q(const lobatto_sweep* sweep) {
-    return sweep->value ? api::data(sweep->value->q) : nullptr;
+    return api::read(sweep, nullptr, [](const auto& value) { return api::data(value.q); });
 }
 const double* lobatto_sweep_p(const lobatto_sweep* sweep) {
-    return sweep->value ? api::data(sweep->value->p) : nullptr;
+    return api::read(sweep, nullptr, [](const auto& value) { return api::data(value.p); });
 }
 const size_t* lobatto_sweep_states_first(const lobatto_sweep* sweep) {
-    return sweep->value ? api::data(sweep->value->states.first) : nullptr;
+    return api::read(sweep, nullptr, [](const auto& value) { return api::data(value.states.first); });
 }
 const double* lobatto_sweep_states_t(const lobatto_sweep* sweep) {
-    return sweep->value ? api::data(sweep->value->states.t) : nullptr;
+    return api::read(sweep, nullptr, [](const auto& value) { return api::data(value.states.t); });
 }
 const double* lobatto_sweep_states_q(const lobatto_sweep* sweep) {
-    return sweep->value ? api::data(sweep->value->states.q) : nullptr;
+    return api::read(sweep, nullptr, [](const auto& value) { return api::data(value.states.q); });
 }
 const double* lobatto_sweep_states_p(const lobatto_sweep* sweep) {
-    return sweep->value ? api::data(sweep->value->states.p) : nullptr;
+    return api::read(sweep, nullptr, [](const auto& value) { return api::data(value.states.p); });
 }
 
 }  // extern "C"

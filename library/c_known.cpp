@@ -22,9 +22,7 @@ struct lobatto_choice : api::Handle<api::Choice> {
     void show_settings();
 };
 
-struct lobatto_proof : api::Handle<std::vector<api::Claim>> {
-    const api::Claim* claim(std::size_t index) const { return value ? api::element(&*value, index) : nullptr; }
-};
+struct lobatto_proof : api::Handle<std::vector<api::Claim>> {};
 
 void lobatto_choice::show_settings() {
     const api::Settings& found = value->settings;
@@ -61,6 +59,10 @@ lobatto_text* written(const lobatto_scene* scene, const lobatto_settings* settin
         [&](lobatto_text& text) { text.value = (api::scene_of(scene).*writer)(api::settings_of(settings)); });
 }
 
+const api::Claim* claim_of(const lobatto_proof* proof, std::size_t index) {
+    return api::read(proof, nullptr, [&](const auto& value) { return api::element(value, index); });
+}
+
 }  // namespace
 
 extern "C" {
@@ -90,16 +92,17 @@ void lobatto_text_free(lobatto_text* text) {
     delete text;
 }
 int lobatto_text_status(const lobatto_text* text) {
-    return text->status;
+    return api::status_of(text);
 }
 const char* lobatto_text_message(const lobatto_text* text) {
-    return text->message.c_str();
+    return api::message_of(text);
 }
 const char* lobatto_text_content(const lobatto_text* text) {
-    return text->value ? text->value->second.c_str() : nullptr;
+    return api::read(text, nullptr, [](const auto& value) { return value.second.c_str(); });
 }
 const char* lobatto_text_file(const lobatto_text* text) {
-    return text->value && !text->value->first.empty() ? text->value->first.c_str() : nullptr;
+    return api::read(text, nullptr,
+                     [](const auto& value) { return value.first.empty() ? nullptr : value.first.c_str(); });
 }
 
 lobatto_choice* lobatto_tune(const lobatto_scene* scene, double error, const lobatto_settings* settings,
@@ -113,28 +116,28 @@ void lobatto_choice_free(lobatto_choice* choice) {
     delete choice;
 }
 int lobatto_choice_status(const lobatto_choice* choice) {
-    return choice->status;
+    return api::status_of(choice);
 }
 const char* lobatto_choice_message(const lobatto_choice* choice) {
-    return choice->message.c_str();
+    return api::message_of(choice);
 }
 const lobatto_settings* lobatto_choice_settings(const lobatto_choice* choice) {
-    return choice->value ? &choice->settings : nullptr;
+    return choice != nullptr && choice->value ? &choice->settings : nullptr;
 }
 const char* lobatto_choice_method(const lobatto_choice* choice) {
-    return choice->value ? choice->value->method.c_str() : nullptr;
+    return api::read(choice, nullptr, [](const auto& value) { return value.method.c_str(); });
 }
 double lobatto_choice_step(const lobatto_choice* choice) {
-    return choice->value ? choice->value->step : 0;
+    return api::read(choice, 0, [](const auto& value) { return value.step; });
 }
 double lobatto_choice_predicted_error(const lobatto_choice* choice) {
-    return choice->value ? choice->value->predicted_error : std::nan("");
+    return api::read(choice, std::nan(""), [](const auto& value) { return value.predicted_error; });
 }
 double lobatto_choice_seconds(const lobatto_choice* choice) {
-    return choice->value ? choice->value->seconds : 0;
+    return api::read(choice, 0, [](const auto& value) { return value.seconds; });
 }
 int lobatto_choice_complete(const lobatto_choice* choice) {
-    return choice->value && choice->value->complete ? 1 : 0;
+    return api::read(choice, 0, [](const auto& value) { return value.complete ? 1 : 0; });
 }
 
 lobatto_proof* lobatto_verify(const lobatto_scene* scene, const lobatto_settings* settings) {
@@ -145,32 +148,32 @@ void lobatto_proof_free(lobatto_proof* proof) {
     delete proof;
 }
 int lobatto_proof_status(const lobatto_proof* proof) {
-    return proof->status;
+    return api::status_of(proof);
 }
 const char* lobatto_proof_message(const lobatto_proof* proof) {
-    return proof->message.c_str();
+    return api::message_of(proof);
 }
 size_t lobatto_proof_count(const lobatto_proof* proof) {
-    return proof->value ? proof->value->size() : 0;
+    return api::read(proof, 0, [](const auto& value) { return value.size(); });
 }
 int lobatto_proof_holds(const lobatto_proof* proof, size_t index) {
-    const api::Claim* const found = proof->claim(index);
+    const api::Claim* const found = claim_of(proof, index);
     return found != nullptr && found->holds ? 1 : 0;
 }
 const char* lobatto_proof_claim(const lobatto_proof* proof, size_t index) {
-    const api::Claim* const found = proof->claim(index);
+    const api::Claim* const found = claim_of(proof, index);
     return found == nullptr ? nullptr : found->claim.c_str();
 }
 const char* lobatto_proof_measured(const lobatto_proof* proof, size_t index) {
-    const api::Claim* const found = proof->claim(index);
+    const api::Claim* const found = claim_of(proof, index);
     return found == nullptr ? nullptr : found->measured.c_str();
 }
 const char* lobatto_proof_bound(const lobatto_proof* proof, size_t index) {
-    const api::Claim* const found = proof->claim(index);
+    const api::Claim* const found = claim_of(proof, index);
     return found == nullptr ? nullptr : found->bound.c_str();
 }
 const char* lobatto_proof_meaning(const lobatto_proof* proof, size_t index) {
-    const api::Claim* const found = proof->claim(index);
+    const api::Claim* const found = claim_of(proof, index);
     return found == nullptr ? nullptr : found->meaning.c_str();
 }
 

@@ -77,14 +77,30 @@ inline Settings settings_of(const lobatto_settings* given) {
     return settings;
 }
 
-inline const char* text(const std::string* string) {
-    return string == nullptr ? nullptr : string->c_str();
+// Element `index` of a list; null if there is none.
+template <class List>
+const typename List::value_type* element(const List& list, std::size_t index) {
+    return index < list.size() ? &list[index] : nullptr;
+}
+inline const char* text(const std::vector<std::string>& list, std::size_t index) {
+    const std::string* const found = element(list, index);
+    return found == nullptr ? nullptr : found->c_str();
 }
 
-// Element `index` of a list; null if there is no list or no such element.
-template <class List>
-const typename List::value_type* element(const List* list, std::size_t index) {
-    return list != nullptr && index < list->size() ? &(*list)[index] : nullptr;
+// Every function of lobatto.h may be given NULL where a handle belongs: its status is that of a machine without memory.
+template <class Made>
+int status_of(const Made* handle) {
+    return handle == nullptr ? 4 : handle->status;
+}
+template <class Made>
+const char* message_of(const Made* handle) {
+    return handle == nullptr ? "there is no handle: NULL was given" : handle->message.c_str();
+}
+
+// What `get` reads from the handle's value; `otherwise` if it has none.
+template <class Made, class Get>
+auto read(const Made* handle, decltype(std::declval<Get>()(*std::declval<Made>().value)) otherwise, Get&& get) {
+    return handle != nullptr && handle->value ? get(*handle->value) : otherwise;
 }
 
 template <class Number>
@@ -94,14 +110,7 @@ const Number* data(const std::vector<Number>& values) {
 
 }  // namespace lobatto::api
 
-struct lobatto_scene : lobatto::api::Handle<lobatto::api::Scene> {
-    const lobatto::api::Variable* coordinate(std::size_t index) const {
-        return value ? lobatto::api::element(&value->coordinates(), index) : nullptr;
-    }
-    const lobatto::api::Variable* parameter(std::size_t index) const {
-        return value ? lobatto::api::element(&value->parameters(), index) : nullptr;
-    }
-};
+struct lobatto_scene : lobatto::api::Handle<lobatto::api::Scene> {};
 
 namespace lobatto::api {
 
