@@ -57,6 +57,9 @@ void keep_scene(const std::string& scene, const std::string& path) {
 
 namespace {
 
+// Of a file's name, in bytes: file systems have 255, and NAME.checkpoint.partial may stand beside it.
+constexpr std::size_t longest_name = 230;
+
 // In lower case: all text that Lobatto writes names it in its first lines, HDF5 in one of its first blocks.
 std::string begin_of(const std::string& path) {
     const std::size_t looked_at = path.ends_with(".h5") ? 1 << 20 : 4096;  // bytes
@@ -72,7 +75,13 @@ std::string begin_of(const std::string& path) {
 
 void keep_foreign(const std::string& path, const std::string& mark) {
     std::error_code none;
-    if (is_standard_output(path) || !std::filesystem::is_regular_file(path, none)) return;
+    if (is_standard_output(path)) return;
+    const std::size_t bytes = std::filesystem::path(path).filename().string().size();
+    if (bytes > longest_name)
+        throw InputError(fmt::format(
+            "{}: the name of the file is {} bytes long; choose one of at most {}, for others are named after it", path,
+            bytes, longest_name));
+    if (!std::filesystem::is_regular_file(path, none)) return;
     const std::string begin = begin_of(path);
     const auto holds = [](const std::string& text, const std::string& part) {
         return text.find(part) != std::string::npos;

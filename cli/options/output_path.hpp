@@ -20,8 +20,8 @@ std::string result_name(const std::string& scene);
 // InputError when `path`, where a result is to go, is the scene itself.
 void keep_scene(const std::string& scene, const std::string& path);
 
-// InputError where a file that is not ours stands in the place of a result. `mark`: in lower case, what the beginning
-// of ours has.
+// InputError where a file that is not ours stands in the place of a result, or where its name is too long for the files
+// that stand beside it while it is written. `mark`: in lower case, what the beginning of ours has.
 void keep_foreign(const std::string& path, const std::string& mark = "lobatto");
 
 // --json: what a command reports as JSON, by its schema in docs/schemas/.

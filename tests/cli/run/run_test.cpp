@@ -598,6 +598,14 @@ TEST_CASE("a run without shortcuts gives the same motion to rounding") {
     for (std::size_t k = 0; k < with.size(); ++k) CHECK(with[k] == doctest::Approx(without[k]).epsilon(1e-11));
 }
 
+TEST_CASE("a name that leaves no room for the files beside it is refused before anything is written") {
+    const Place place;
+    const test::Finished done = place.run({pendulum, "-o", place.file(std::string(240, 'a') + ".csv"), "--until", "1"});
+    CHECK(done.exit_code == 2);
+    CHECK(test::contains(done.err, "the name of the file is 244 bytes long; choose one of at most 230"));
+    CHECK(place.run({pendulum, "-o", place.file(std::string(226, 'a') + ".csv"), "--until", "1"}).exit_code == 0);
+}
+
 TEST_CASE("files that Lobatto did not write are never touched") {
     const Place place;
     const std::string out = place.file("w.csv");
