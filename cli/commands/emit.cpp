@@ -150,7 +150,7 @@ void emit_scene(const EmitCommand& options) {
                             options.scene));
         const fs::path support = fs::path(options.folder) / "kernel.hpp";
         keep_scene(options.scene, support);
-        keep_foreign(support);
+        keep_foreign(support, "#ifndef lobatto_kernel_");
         write_whole(support, "the header", support_text());
     }
     write_whole(path, "the header", source.header);

@@ -22,7 +22,9 @@ void add_schema(CommandLine& program) {
         if (output->empty()) {
             fmt::print("{}", scene_schema());
         } else {
-            keep_foreign(*output);
+            if (!is_standard_output(*output) && !output->ends_with(".json"))
+                throw InputError(fmt::format("-o: {} is no .json", *output));
+            keep_foreign(*output, "\"title\": \"a scene of lobatto\"");
             write_whole(*output, "the schema", scene_schema());
         }
     });

@@ -55,7 +55,8 @@ void tradeoff(const TradeoffOptions& options) {
 
     keep_foreign(folder + "/tradeoff.csv", "family,points,precision");
     keep_foreign(folder + "/measurements.jsonl", " to t = ");
-    for (const char* name : {"tradeoff.json", "report.html", "work_precision.svg", "error.svg", "energy.svg"})
+    keep_foreign(folder + "/tradeoff.json", "\"command\":\"tradeoff\"");
+    for (const char* name : {"report.html", "work_precision.svg", "error.svg", "energy.svg"})
         keep_foreign(folder + "/" + name);
     const Interruption interruption;
     Say say(seconds);

@@ -60,7 +60,24 @@ namespace {
 // Of a file's name, in bytes: file systems have 255, and NAME.checkpoint.partial may stand beside it.
 constexpr std::size_t longest_name = 230;
 
-// In lower case: all text that Lobatto writes names it in its first lines, HDF5 in one of its first blocks.
+// In lower case, by their endings: what stands in the first lines of the files that we write, and in no others.
+constexpr std::pair<std::string_view, std::string_view> marks[] = {
+    {".csv", "# lobatto"},
+    {".h5", "lobatto"},
+    {".hpp", "// written by lobatto from a scene file"},
+    {".html", "<meta name=\"generator\" content=\"lobatto\">"},
+    {".json", "\"lobatto\": \""},
+    {".1", ".th lobatto"},
+    {".md", "written by `lobatto "},
+};
+
+std::string mark_of(const std::string& path) {
+    for (const auto& [ending, mark] : marks)
+        if (path.ends_with(ending)) return std::string(mark);
+    return "";
+}
+
+// In lower case: text names Lobatto in its first lines, HDF5 in one of its first blocks.
 std::string begin_of(const std::string& path) {
     const std::size_t looked_at = path.ends_with(".h5") ? 1 << 20 : 4096;  // bytes
     std::string begin(looked_at, '\0');
@@ -73,7 +90,7 @@ std::string begin_of(const std::string& path) {
 
 }  // namespace
 
-void keep_foreign(const std::string& path, const std::string& mark) {
+void keep_foreign(const std::string& path, const std::string& given_mark) {
     std::error_code none;
     if (is_standard_output(path)) return;
     const std::size_t bytes = std::filesystem::path(path).filename().string().size();
@@ -82,18 +99,16 @@ void keep_foreign(const std::string& path, const std::string& mark) {
             "{}: the name of the file is {} bytes long; choose one of at most {}, for others are named after it", path,
             bytes, longest_name));
     if (!std::filesystem::is_regular_file(path, none)) return;
-    const std::string begin = begin_of(path);
-    const auto holds = [](const std::string& text, const std::string& part) {
-        return text.find(part) != std::string::npos;
-    };
+    const std::string begin = begin_of(path), mark = given_mark.empty() ? mark_of(path) : given_mark;
+    const auto holds = [&](const std::string& part) { return begin.find(part) != std::string::npos; };
     // Pictures do not name the program that wrote them: they may be overwritten. What an array is of stands beside it.
     const bool names_nobody = (path.ends_with(".png") && begin.starts_with("\x89png")) ||
                               (path.ends_with(".gif") && begin.starts_with("gif8")) ||
                               (path.ends_with(".mp4") && begin.substr(0, 8).ends_with("ftyp"));
-    const bool is_table = path.ends_with(".csv") && mark == "lobatto";
-    const bool is_ours = (is_table ? begin.starts_with("# lobatto") : holds(begin, mark)) ||
-                         (begin.starts_with("<?xml") && holds(begin, "produced by gnuplot")) ||
-                         (begin.starts_with("\x93numpy") && holds(begin_of(path + ".json"), "lobatto"));
+    const bool is_ours =
+        (!mark.empty() && (path.ends_with(".csv") && given_mark.empty() ? begin.starts_with(mark) : holds(mark))) ||
+        (path.ends_with(".svg") && begin.starts_with("<?xml") && holds("produced by gnuplot")) ||
+        (begin.starts_with("\x93numpy") && begin_of(path + ".json").find(mark_of(".json")) != std::string::npos);
     if (!begin.empty() && !is_ours && !names_nobody)
         throw InputError(fmt::format(
             "{} is there, and Lobatto did not write it. Move it away, or choose another place with -o", path));

@@ -21,8 +21,9 @@ std::string result_name(const std::string& scene);
 void keep_scene(const std::string& scene, const std::string& path);
 
 // InputError where a file that is not ours stands in the place of a result, or where its name is too long for the files
-// that stand beside it while it is written. `mark`: in lower case, what the beginning of ours has.
-void keep_foreign(const std::string& path, const std::string& mark = "lobatto");
+// that stand beside it while it is written. `mark`: in lower case, what the beginning of ours has; empty: what all files
+// with this ending have.
+void keep_foreign(const std::string& path, const std::string& mark = "");
 
 // --json: what a command reports as JSON, by its schema in docs/schemas/.
 Option add_json_option(Command& command, bool& json);

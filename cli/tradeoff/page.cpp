@@ -112,6 +112,7 @@ std::string report_page(const Experiment& experiment, const std::string& folder,
 <html lang="en">
 <head>
 <meta charset="utf-8">
+<meta name="generator" content="Lobatto">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}: speed and accuracy</title>
 <style>{style}</style>

@@ -666,6 +666,32 @@ TEST_CASE("files that Lobatto did not write are never touched") {
     const test::Finished emitted = test::run({LOBATTO_PROGRAM, "emit", pendulum, "-o", place.file(".")});
     CHECK(emitted.exit_code == 2);
     CHECK(test::read_file(place.file("kernel.hpp")) == "mine");
+    // Files of one's own that only speak of Lobatto, and scenes.
+    const auto kept = [&](const std::string& name, const std::string& content, std::vector<std::string> command) {
+        test::write_text(place.file(name), content);
+        command.insert(command.begin(), LOBATTO_PROGRAM);
+        const test::Finished done = test::run(command);
+        CAPTURE(done.err);
+        CHECK(done.exit_code == 2);
+        CHECK(test::read_file(place.file(name)) == content);
+    };
+    const std::string include = "#include <lobatto/lobatto.hpp>\nclass Arm {};\n";
+    kept("pendulum.hpp", include, {"emit", pendulum, "--standalone", "-o", place.file(".")});
+    kept("kernel.hpp", include, {"emit", pendulum, "-o", place.file(".")});
+    kept("other.toml", test::read_file(pendulum), {"view", pendulum, "-o", place.file("other.toml")});
+    kept("notes.html", "<p>on Lobatto", {"view", pendulum, "-o", place.file("notes.html")});
+    kept("other.toml", test::read_file(pendulum), {"schema", "-o", place.file("other.toml")});
+    kept("s.json", "{\"title\": \"Lobatto\"}", {"schema", "-o", place.file("s.json")});
+    kept("n.svg", "<svg><!-- lobatto --></svg>", {"stability", pendulum, "--chart", place.file("n.svg")});
+    for (const auto& words : std::vector<std::vector<std::string>>{{"emit", pendulum, "--standalone", "-o", folder},
+                                                                   {"emit", pendulum, "-o", folder},
+                                                                   {"view", pendulum, "-o", folder + "/p.html"},
+                                                                   {"schema", "-o", folder + "/s.json"},
+                                                                   {"manual", "-o", folder}}) {
+        std::vector<std::string> command = words;
+        command.insert(command.begin(), LOBATTO_PROGRAM);
+        for (int i = 0; i < 2; ++i) CHECK_MESSAGE(test::run(command).exit_code == 0, words[0]);  // ours may be replaced
+    }
     // A whole file takes another name for its own beginning.
     test::write_text(place.file("t.json.partial"), "mine");
     CHECK(place.run({pendulum, "-o", out, "--until", "1"}).exit_code == 0);
