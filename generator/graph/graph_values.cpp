@@ -176,11 +176,32 @@ Id Graph::negate_terms(Id sum) {
     return add(terms);
 }
 
+// The binary exponent of the largest rational factor of a term of a sum.
+int Graph::binary_content(Id sum) const {
+    cln::cl_R largest = 0;
+    for (const Id term : (*this)[sum].operands) {
+        const Node& node = (*this)[term];
+        cln::cl_R factor = 1;
+        for (const Id part : node.op == Op::multiply ? node.operands : std::vector<Id>{term})
+            if (is_constant(part) && is_rational(constant_of(part).value)) factor = factor * constant_of(part).value;
+        largest = cln::max(largest, cln::abs(factor));
+    }
+    return static_cast<int>(cln::float_exponent(cln::cl_float(largest, format())));
+}
+
 // GiNaC chooses between (a - b) (c - d) and (b - a) (d - c) by address; here each sum has a sign of its own.
 void Graph::append_factor(std::vector<Id>& factors, Id base, int exponent) {
     if (leads_with_minus(base)) {
         base = negate_terms(base);
         if (exponent % 2 != 0) factors.push_back(number(-1));
+    }
+    // GiNaC takes (1 - x^2/1.234567^2)^30 for (1524155677489 - 10^12 x^2)^30/1524155677489^30: powers that no number
+    // type may hold. A power of two goes from each term to the front, which changes no rounding.
+    constexpr int most_content = 64;  // bits
+    const int content = (*this)[base].op == Op::add && std::abs(exponent) > 1 ? binary_content(base) : 0;
+    if (std::abs(content * exponent) > most_content) {
+        base = multiply({constant(cln::expt(cln::cl_RA(2), -content)), base});
+        factors.push_back(constant(cln::expt(cln::cl_RA(2), content * exponent)));
     }
     factors.push_back(power(base, exponent));
 }

@@ -54,6 +54,28 @@ TEST_CASE("equal expressions are one node, in whatever order they were built") {
     CHECK(g.graph.function(Op::sin, a) != g.graph.function(Op::cos, b));
 }
 
+TEST_CASE("high powers of sums with decimals hold no number that a double cannot") {
+    const GiNaC::symbol x("x");
+    const auto decimal = [](long digits, long one) { return GiNaC::numeric(digits, one); };
+    for (const GiNaC::ex& e : std::vector<GiNaC::ex>{
+             GiNaC::pow(1 - x * x / GiNaC::pow(decimal(1234567, 1000000), 2), 30),
+             GiNaC::pow(1 + x * x / GiNaC::pow(decimal(123456789, 100000000), 2), -20),
+             GiNaC::pow(x * decimal(1, 100000000) - decimal(1, 700000000), 47) * GiNaC::pow(10, 8 * 47),
+             GiNaC::pow(decimal(1234567, 10000000) - x, 47) * (1 + x)}) {
+        Inputs g;
+        const Id id = g.graph.from(e, {{x, g.x}});
+        for (const Id node : g.graph.topological({id})) {
+            if (!g.graph.is_constant(node)) continue;
+            const double size = std::fabs(cln::double_approx(g.graph.constant_of(node).value));
+            CHECK(size < 1e25);
+            CHECK(size > 1e-25);
+        }
+        const GiNaC::ex value = e.subs(x == decimal(3, 10)).evalf();
+        CHECK(cln::double_approx(g.value(id, cln::cl_RA(3) / 10)) ==
+              doctest::Approx(GiNaC::ex_to<GiNaC::numeric>(value).to_double()).epsilon(1e-14));
+    }
+}
+
 TEST_CASE("the order of terms is that of the inputs, not of construction") {
     Graph forwards, backwards;
     const auto build = [](Graph& graph, bool reverse) {
