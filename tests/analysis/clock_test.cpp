@@ -436,6 +436,18 @@ TEST_CASE("a clock that runs away with an escaping motion is told, and one that 
     CHECK(slower.err.empty());
 }
 
+TEST_CASE("an event of what the motion conserves does not end it") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml",
+                     "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
+                     "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 0.1 }\n"
+                     "[output]\nevents = [\"x*y' - y*x' = 0.1\"]\n[method]\npoints = 9\nclock = \"auto\"\n"
+                     "[run]\nstep = 0.1\nuntil = 20\n");
+    const test::Finished done =
+        test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet"});
+    CHECK_MESSAGE(done.exit_code == 0, done.err);
+}
+
 TEST_CASE("a motion with a clock that fails tells the last state of its file") {
     const test::TemporaryFolder folder;
     for (const double step : {0.05, 0.1}) {

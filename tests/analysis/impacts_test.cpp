@@ -292,7 +292,9 @@ TEST_CASE("impacts that accumulate end the run, with the state before that step"
         const Ended ended = run(fmt::format(fmt::runtime(ball), e) + method("points = 4", 0.15, 4));
         CHECK(ended.result.status == LOBATTO_IMPACTS_ACCUMULATE);
         CHECK(std::fabs(ended.result.time - (e == 0.5 ? 2.85 : 0.9)) < 1e-14);
-        CHECK(std::fabs(ended.events.back()[1] - (e == 0.5 ? 3 : 1)) < 1e-6);
+        // Of the step that was not taken no impact is told: those of e = 0.5 are at 1, 2, 2.5, 2.75, ...
+        CHECK(ended.events.size() == (e == 0.5 ? 4 : 0));
+        CHECK((ended.events.empty() || ended.events.back()[1] <= ended.result.time));
         CHECK(test::contains(explain_stop(ended.result, TrajectoryRequest()), "impacts accumulate"));
     }
     // At rest on the floor from the start.

@@ -280,6 +280,42 @@ TEST_CASE("an event that an input jumps over is none, and one that begins where 
     CHECK(times[1] == doctest::Approx(1.35));
 }
 
+TEST_CASE("an emitted kernel goes on as it was after inputs that it refuses, and a step that it does not take" *
+          doctest::test_suite("slow")) {
+    const lobatto::test::TemporaryFolder folder;
+    const std::string file = folder / "ball.toml";
+    lobatto::test::write_text(
+        file,
+        "lagrangian = \"y'^2/2 - y\"\n[coordinates]\ny = { position = 1, velocity = 0 }\n[inputs]\nf = 0\n"
+        "[impacts]\nfloor = { when = \"y = f falling\", restitution = 0.5 }\n[run]\nstep = 0.1\nuntil = 10\n");
+    const lobatto::test::Finished emitted =
+        lobatto::test::run({LOBATTO_PROGRAM, "emit", file, "--standalone", "-o", folder.string()});
+    REQUIRE_MESSAGE(emitted.exit_code == 0, emitted.err);
+    lobatto::test::write_text(
+        folder / "program.cpp",
+        "#include \"ball.hpp\"\n#include <cstdio>\n"
+        "using Ball = lobatto::HybridStepper<lobatto::kernels::ball>;\n"
+        "int main() {\n"
+        "    Ball one, other;\n"
+        "    lobatto::kernels::ball::Parameters values;\n"
+        "    const double q[] = {1}, p[] = {0};\n"
+        "    for (Ball* ball : {&one, &other}) {\n"
+        "        if (ball->prepare(values, 0.1) != lobatto::Status::ok) return 1;\n"
+        "        if (ball->start(0, q, p) != lobatto::Status::ok) return 2;\n    }\n"
+        "    lobatto::Status status = lobatto::Status::ok;\n"
+        "    for (int i = 0; status == lobatto::Status::ok && i < 100; ++i) {\n"
+        "        values.f = 2;\n"
+        "        if (i == 5 && one.set_inputs(values) != lobatto::Status::off_constraints) return 3;\n"
+        "        status = one.step();\n"
+        "        if (other.step() != status || one.q()[0] != other.q()[0]) return 4;\n    }\n"
+        "    std::printf(\"%d %g %d\\n\", int(status), one.time(), int(one.events()));\n}\n");
+    const lobatto::test::Finished compiled =
+        lobatto::test::run({"g++", "-std=c++17", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic",
+                            "-Werror", "-o", folder / "program", folder / "program.cpp"});
+    REQUIRE_MESSAGE(compiled.exit_code == 0, compiled.err);
+    CHECK(lobatto::test::run({folder / "program"}).out == "12 4.2 0\n");  // sqrt(2) (1 + e)/(1 - e) = 4.24
+}
+
 TEST_CASE("an emitted kernel with inputs, a wall and an event takes the steps of the library, to the same bits" *
           doctest::test_suite("slow")) {
     const lobatto::test::TemporaryFolder folder;

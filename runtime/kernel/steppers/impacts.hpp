@@ -234,16 +234,22 @@ struct Sides {
 };
 
 // (D60) As set_inputs (inputs.hpp) of a stepper that knows its parameters. The sides of switches are those of the
-// state.
+// state. Refused values change nothing.
 template <class K>
 Status set_watched_inputs(WatchedStepper<K>& stepper, typename K::Parameters values) {
-    for (int i = K::first_input; i < K::first_input + K::inputs; ++i)
-        K::parameter(stepper.parameters, i) = K::parameter(values, i);
-    const Status status = set_inputs(stepper, stepper.parameters);
-    if constexpr (WatchedStepper<K>::walls > 0)
-        return status == Status::ok ? Sides<K>::take_again(stepper) : status;
-    else
-        return status;
+    const auto put = [&](typename K::Parameters given) {
+        for (int i = K::first_input; i < K::first_input + K::inputs; ++i)
+            K::parameter(stepper.parameters, i) = K::parameter(given, i);
+        const Status status = set_inputs(stepper, stepper.parameters);
+        if constexpr (WatchedStepper<K>::walls > 0)
+            return status == Status::ok ? Sides<K>::take_again(stepper) : status;
+        else
+            return status;
+    };
+    const typename K::Parameters before = stepper.parameters;
+    const Status status = put(values);
+    if (status != Status::ok) put(before);
+    return status;
 }
 
 // Looks at each step of one stepper: keep before it, look after it.
@@ -280,13 +286,16 @@ public:
     // the state after it. Without rows none are sought, and the motion does not stop. Status::stopped: the last row
     // says where and why. Where walls fail, the stepper is where it was before the step.
     Status look(S& stepper, real* rows, std::int64_t& count) {
+        const std::int64_t before = count;
+        Status status = Status::ok;
         if constexpr (walls > 0) {
-            const Status status = look_with_walls(stepper, rows, count);
+            status = look_with_walls(stepper, rows, count);
             if (status != Status::ok) go_back(stepper);
-            return status;
-        } else {
-            return rows == nullptr ? Status::ok : find(stepper, real(1), Cut::none, rows, count);
+        } else if (rows != nullptr) {
+            status = find(stepper, real(1), Cut::none, rows, count);
         }
+        if (status != Status::ok && status != Status::stopped) count = before;  // the step was not taken
+        return status;
     }
 
 private:
