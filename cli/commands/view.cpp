@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 #include <sstream>
 
 #include "cli/commands/commands.hpp"
@@ -49,6 +50,7 @@ struct Beside {
 Beside beside_of(const std::string& text) {
     Beside beside;
     std::istringstream words(text);
+    std::set<std::string> keys;
     for (std::string word; words >> word;) {
         const std::size_t equals = word.find('=');
         const std::string key = word.substr(0, equals),
@@ -78,7 +80,9 @@ Beside beside_of(const std::string& text) {
             throw InputError(fmt::format(
                 "--beside: '{}' is not known; write points=2, stages=1, splitting=11 or step=0.1, with blanks between",
                 word));
+        if (!keys.insert(key).second) throw InputError(fmt::format("--beside: {} is given twice", key));
     }
+    if (keys.empty()) throw InputError("--beside: write what differs, as in \"points=2 step=0.1\"");
     return beside;
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -47,6 +48,7 @@ public:
         while (count() > most_ + 1) halve();
     }
     std::size_t count() const { return rows_.size() / (columns_ + 1); }
+    std::int64_t every() const { return every_; }  // one state in so many is shown
     // t, q, p, H.
     const double* row(std::size_t i) const { return rows_.data() + i * (columns_ + 1); }
 
@@ -185,8 +187,9 @@ void fill_steps(Scene& scene, std::size_t most_frames) {
     if (scene.clock) {
         outputs.interval = scene.run.until / GiNaC::numeric(static_cast<long>(wanted));
     } else if (!scene.is_cut() && scene.method.family != Family::splitting && scene.run.stops.empty()) {
-        const double steps =
-            (scene.evaluate(scene.run.until, "the end time") / scene.evaluate(scene.run.step, "the step")).to_double();
+        const double step = scene.evaluate(scene.run.step, "the step").to_double();
+        if (!(step > 0)) return;  // the run says it
+        const double steps = scene.evaluate(scene.run.until, "the end time").to_double() / step;
         const double between = std::ceil(static_cast<double>(wanted) / std::max(steps, 1.0)) - 1;
         outputs.dense = static_cast<int>(std::clamp(between, 0.0, static_cast<double>(most_dense)));
     }
@@ -210,6 +213,29 @@ std::vector<std::vector<double>> frames_of(const ShownStates& states, const Load
         frames.push_back(frame);
     }
     return frames;
+}
+
+// Whether so few states are shown that what is seen is another motion: between two of them the mean velocity does not
+// lead from one position to the next, or an angle goes most of half a turn. `frames`: parameters, t, q, velocities, ...
+bool is_too_fast(const Scene& scene, const std::vector<std::vector<double>>& frames) {
+    const std::size_t n = scene.coordinates.size(), first = scene.parameters.size() + 1;
+    for (std::size_t k = 0; k < n; ++k) {
+        double low = std::numeric_limits<double>::infinity(), high = -low, missed = 0, turned = 0;
+        for (std::size_t i = 0; i < frames.size(); ++i) {
+            const double q = frames[i][first + k], v = frames[i][first + n + k];
+            low = std::min(low, q);
+            high = std::max(high, q);
+            if (i == 0) continue;
+            const std::vector<double>& before = frames[i - 1];
+            const double way = (frames[i][first - 1] - before[first - 1]) * (before[first + n + k] + v) / 2;
+            missed += std::fabs(q - before[first + k] - way);
+            turned += std::fabs(way);
+        }
+        const double steps = static_cast<double>(frames.size() - 1);
+        if (missed / steps > 0.25 * (high - low) / 2) return true;
+        if (scene.coordinates[k].unit == "rad" && turned / steps > 2) return true;
+    }
+    return false;
 }
 
 }  // namespace
@@ -270,10 +296,17 @@ Viewed viewed_motion(const api::Scene& written, const api::Settings& settings, b
         stepper.start(request.time, request.q, request.p);
     ViewMotion& motion = viewed.motion;
     motion.label = is_alone ? viewed.title : method;
-    motion.note = fmt::format("{}h = {:.4g}{}", motion.label == method ? "" : method + ", ", request.step,
-                              scene.clock ? " in the time of a clock" : "");
+    motion.note = fmt::format("{}h = {:.4g}{}{}", motion.label == method ? "" : method + ", ", request.step,
+                              scene.clock ? " in the time of a clock" : "",
+                              states.every() > 1 ? fmt::format(", one state in {}", states.every()) : "");
     for (std::size_t i = 0; i < states.count(); ++i) motion.times.push_back(states.row(i)[0]);
-    motion.channels = channels.values(frames_of(states, stepper, request));
+    const std::vector<std::vector<double>> frames = frames_of(states, stepper, request);
+    motion.channels = channels.values(frames);
+    if (viewed.failure.empty() && states.every() > 1 && is_too_fast(scene, frames))
+        viewed.failure = fmt::format(
+            "the page has room for one state in {}, and between two of them the motion goes too far: what moves there "
+            "looks like another motion. Try an earlier end, such as --until {:.4g}",
+            states.every(), 0.999 * motion.times.back() / static_cast<double>(states.every()));
     for (const Event& event : scene.reported()) motion.event_names.push_back(event.text);
     return viewed;
 }

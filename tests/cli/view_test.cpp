@@ -210,6 +210,9 @@ TEST_CASE("a scene stands beside itself by another method; wrong options are tol
     };
     CHECK(refused("point=2").find("--beside: 'point=2' is not known; write points=2") != std::string::npos);
     CHECK(refused("points=two").find("--beside: points needs a whole number") != std::string::npos);
+    CHECK(refused("points=2 points=3").find("--beside: points is given twice") != std::string::npos);
+    CHECK(refused("").find("--beside: write what differs") != std::string::npos);
+    CHECK(refused("step=0").find("--step: the step must be positive, but is 0") != std::string::npos);
     CHECK(refused("points=40").find("--beside: there is no method lobatto with 40") != std::string::npos);
 }
 
@@ -225,6 +228,27 @@ TEST_CASE("a motion that fails on its way is shown as far as it came, with a war
     CHECK(beside.err.find("A plane pendulum, Lobatto, 3 points, h = 2.9: the motion on the page ") !=
           std::string::npos);
     CHECK(beside.err.find("Lobatto, 4 points") == std::string::npos);
+}
+
+TEST_CASE("a motion too fast for the states that a page has room for is told, with an end that is not") {
+    const test::TemporaryFolder folder;
+    const auto warning = [&](const std::string& scene, const std::string& until) {
+        const test::Finished finished =
+            test::run({LOBATTO_PROGRAM, "view", scene, "--until", until, "--quiet", "-o", folder / "x.html"});
+        CHECK(finished.exit_code == 0);
+        return finished.err;
+    };
+    const std::string oscillator = tree + "/scenes/harmonic_oscillator.toml", told = warning(oscillator, "1e5");
+    const std::string try_this = "Try an earlier end, such as --until ";
+    CHECK(told.find("the page has room for one state in 64") != std::string::npos);
+    REQUIRE(told.find(try_this) != std::string::npos);
+    CHECK(warning(oscillator, std::to_string(std::stod(told.substr(told.find(try_this) + try_this.size())))).empty());
+    test::write_text(
+        folder / "rotor.toml",
+        "lagrangian = \"a'^2/2 + cos(a)/9\"\n[coordinates]\na = { unit = \"rad\", position = 0, velocity = "
+        "10 }\n[run]\nstep = 0.02\nuntil = 10\n");
+    CHECK(warning(folder / "rotor.toml", "1e4").find("the page has room for") != std::string::npos);
+    CHECK(warning(folder / "rotor.toml", "600").empty());
 }
 
 TEST_CASE("curves of formulas of pieces are on the side where the motion is") {
