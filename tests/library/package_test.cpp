@@ -169,5 +169,15 @@ TEST_SUITE("slow") {
               std::string::npos);
         CHECK(configure("lobatto_add_kernel(a SCENE x.toml PLAIN ENSEMBLE)").find("PLAIN has no ensembles") !=
               std::string::npos);
+        // What numbers beyond long double need is linked, whoever names them.
+        const auto linked = [&](const std::string& method, const std::string& call) {
+            test::write_text(folder / "x.toml", "lagrangian = \"q'^2/2\"\n[method]\n" + method + "\n");
+            CHECK(configure("lobatto_add_kernel(a SCENE x.toml " + call + ")") == "");
+            return test::read_file(folder / "build/CMakeFiles/a.dir/link.txt");
+        };
+        CHECK(test::contains(linked("points = 4", "NUMBERS \"50 digits\""), "-lmpfr"));
+        CHECK(test::contains(linked("numbers = \"30 digits\"", ""), "-lmpfr"));
+        CHECK(test::contains(linked("numbers = 'quadruple'", ""), "-lquadmath"));
+        CHECK_FALSE(test::contains(linked("numbers = \"30 digits\"", "NUMBERS double"), "-l"));
     }
 }
