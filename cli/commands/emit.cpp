@@ -71,6 +71,10 @@ void print_use(const KernelSource& source, const EmitCommand& options, const Sce
                                    : "",
         hybrid ? "HybridStepper" : "Stepper", hybrid ? "q()" : "q", hybrid ? "; .events()" : "",
         tolerance.empty() ? "" : fmt::format("  stepper.{};\n", tolerance));
+    if (options.ensemble)
+        fmt::print(std::cout,
+                   "Many side by side: lobatto::Ensemble<lobatto::kernels::{}, 8> (docs/library.md, Ensembles)\n",
+                   source.name);
 }
 
 // The folder, made where it is not there, and the file in it, which must not be the scene.
