@@ -127,10 +127,14 @@ Choice tune(const Scene& scene, double error, const Settings& settings, double b
     });
 }
 
-std::vector<Claim> verify(const Scene& scene, const Settings& settings) {
+std::vector<Claim> verify(const Scene& scene, const Settings& settings,
+                          const std::function<bool(const std::string&)>& progress) {
     return in_algebra([&] {
         std::vector<Claim> claims;
-        for (const ProofRow& row : proof_of(scene, settings).rows)
+        const auto say = [&](const std::string& what, double) {
+            if (progress && !ask(progress, what)) throw ComputationError(scene.path() + ": verify was ended");
+        };
+        for (const ProofRow& row : proof_of(scene, settings, say).rows)
             claims.push_back({row.claim, row.measured, row.bound, row.holds, row.meaning});
         return claims;
     });

@@ -466,5 +466,8 @@ std::vector<EventHit> Stepper::take_events() {
     parts.found.erase(parts.found.begin(), ahead);
     return taken;
 }
+const std::vector<std::string>& Stepper::events() const {
+    return parts_->kernel.events();
+}
 
 }  // namespace lobatto::api

@@ -29,6 +29,7 @@ StartsRequest request_of(const Starts& starts) {
 namespace {
 
 constexpr double most_memory = 4e9;  // bytes of kept states
+constexpr int most_threads = 1024;
 
 // A name has one value or many.
 void refuse_both(const Settings& settings, const SweepStarts& starts) {
@@ -103,8 +104,10 @@ void keep(Sweep& sweep, const lobatto::Scene& scene, const EnsembleTrajectory& t
 }  // namespace
 
 OpenedSweep open_sweep(const Scene& scene, const StartsRequest& starts, const SweepOptions& options) {
-    if (options.threads < 0)
-        throw lobatto::InputError(fmt::format("--threads: {} is no number of threads", options.threads));
+    if (options.threads < 0 || options.threads > most_threads)
+        throw lobatto::InputError(
+            fmt::format("--threads: {} is no number of threads; 0 takes one for each processor, {} are the most",
+                        options.threads, most_threads));
     if (options.steps && !options.until.empty())
         throw lobatto::InputError("--steps: the end is given by --until; leave one of them out");
     auto study = in_algebra([&] {

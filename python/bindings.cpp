@@ -409,10 +409,9 @@ void add_stepper(py::module_& module) {
                 return owned(stepper.tangent(), static_cast<py::ssize_t>(2 * stepper.coordinates()));
             },
             "d(q1, p1)/d(q, p) of the next step, 2n x 2n.")
-        .def("_take_events",
-             [](lob::Stepper& stepper, const std::vector<std::string>& names) {
-                 return events_of(stepper.take_events(), names);
-             })
+        .def(
+            "take_events", [](lob::Stepper& stepper) { return events_of(stepper.take_events(), stepper.events()); },
+            "Events, stops and impacts since the last call: (what, t, q, p); of an impact the momenta after it.")
         .def_property_readonly("_next_time", &lob::Stepper::next_time)
         .def("_states_at", &states_at);
 }
@@ -431,7 +430,8 @@ PYBIND11_MODULE(_lobatto, module) {
     module.def("tune", &tune, py::arg("scene"), py::arg("error"), py::arg("budget"), py::arg("progress"));
     module.def("verify", [](const lob::Scene& scene, const py::kwargs& given) {
         const lob::Settings settings = settings_of(given);
-        const auto claims = unlocked([&] { return lob::verify(scene, settings); });
+        const auto going_on = watched<const std::string&>(py::none());  // hears Ctrl-C
+        const auto claims = unlocked([&] { return lob::verify(scene, settings, going_on); });
         py::list rows;
         for (const lob::Claim& claim : claims)
             rows.append(py::make_tuple(claim.claim, claim.measured, claim.bound, claim.holds));

@@ -72,6 +72,8 @@ class Trajectory(_Rows):
     ``run["x"]`` is a column by its name, also of ``columns`` (count x ``column_names``): multipliers that the scene asks
     for, eliminated coordinates and their velocities, the orientation and angular velocity of bodies.
 
+    ``events``: what happened, a list of (what, t, q, p), with ``what`` one of ``event_names``: events, stops and
+    impacts as the scene writes them; of an impact the momenta after it.
     ``error``: measured at the end, relative to the amplitude of the motion; None where it was not measured.
     ``run(t)`` gives states at any times in between, by steps from the state before that end there.
     ``reaches_end``: False where the end is no multiple of the step, and the run ended at the last one before.
@@ -107,17 +109,20 @@ class Trajectory(_Rows):
         """Draws columns (all coordinates where none is named) over x by matplotlib; returns the axes."""
         from matplotlib import pyplot
 
+        def text(words):  # what stands between two $ would be read as mathematics
+            return words.replace("$", r"\$")
+
         ax = ax or pyplot.figure().gca()
         units = dict(zip(self.names, self.units))
         for name in names or self.names:
             unit = units.get(name, "")
-            ax.plot(self[x], self[name], label=f"{name} ({unit})" if unit else name, **options)
-        ax.set_xlabel(f"{x} ({units[x]})" if units.get(x) else x)
+            ax.plot(self[x], self[name], label=text(f"{name} ({unit})" if unit else name), **options)
+        ax.set_xlabel(text(f"{x} ({units[x]})" if units.get(x) else x))
         if len(names or self.names) == 1:
             ax.set_ylabel(ax.get_lines()[-1].get_label())
         else:
             ax.legend()
-        ax.set_title(self.scene.title)
+        ax.set_title(text(self.scene.title))
         return ax
 
     def _facts(self):

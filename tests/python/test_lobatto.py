@@ -319,6 +319,33 @@ def test_ctrl_c_ends_a_long_run(pendulum):
         lobatto.run(pendulum, until=1e9, every=10**6, measure=False)
 
 
+def test_ctrl_c_ends_verify():
+    scene = lobatto.Scene(str(SCENES / "double_pendulum.toml"))
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        lobatto.verify(scene)
+
+
+def test_steps_tell_what_they_met():
+    scene = lobatto.Scene(str(SCENES / "bouncing_ball.toml"))
+    ball, run, met = lobatto.Stepper(scene), lobatto.run(scene), []
+    while ball.t < run.t[-1] - 1e-9:
+        ball.step()
+        met += ball.take_events()
+    assert ball.take_events() == [] and len(met) == len(run.events) > 3
+    for one, other in zip(met, run.events):
+        assert one[0] == other[0] == scene.events[0] and one[1] == other[1] and numpy.array_equal(one[3], other[3])
+
+
+def test_dollars_in_titles_are_no_mathematics(tmp_path):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    run = lobatto.run(lobatto.Lagrangian("q'^2/2 - q^2/2", q=dict(position=1, unit="US$/m^$"), title="$5, then $6_"))
+    axes = run.plot()
+    axes.figure.savefig(tmp_path / "a.png")
+    assert axes.get_title() == r"\$5, then \$6_"
+
+
 def test_ctrl_c_ends_long_steps(pendulum):
     for goes_on in lambda stepper: stepper.advance(10**12), lambda stepper: stepper.advance_to(1e9):
         stepper = lobatto.Stepper(pendulum)

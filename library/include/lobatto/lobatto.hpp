@@ -221,7 +221,8 @@ public:
     /// All inputs, in the order of inputs().
     void set_inputs(const double* values);
 
-    std::vector<EventHit> take_events();  ///< until t(), since the last call
+    std::vector<EventHit> take_events();             ///< until t(), since the last call
+    const std::vector<std::string>& events() const;  ///< what EventHit::kind counts, as Scene::events()
 
 private:
     struct Parts;
@@ -421,11 +422,13 @@ struct Claim {
     bool holds = false;
     std::string meaning;  ///< of a failure
 };
-/// Everything that can be checked of a scene, from the quadrature to the running kernel.
+/// Everything that can be checked of a scene, from the quadrature to the running kernel. `progress`: told what is being
+/// done; false ends it, which then throws ComputationError.
 ///
 ///     for (const lob::Claim& claim : lob::verify(scene))
 ///         if (!claim.holds) std::printf("%s: %s\n", claim.claim.c_str(), claim.meaning.c_str());
 ///
-LOBATTO_API std::vector<Claim> verify(const Scene& scene, const Settings& settings = {});
+LOBATTO_API std::vector<Claim> verify(const Scene& scene, const Settings& settings = {},
+                                      const std::function<bool(const std::string&)>& progress = {});
 
 }  // namespace lobatto::api
