@@ -457,11 +457,12 @@ ex parse_expression(const Source& source, const Text& text, const Scope& scope) 
 }
 
 GiNaC::numeric value_in_range(const Source& source, Position at, const ex& expression, const std::string& formula,
-                              const GiNaC::exmap& symbols) {
+                              const GiNaC::exmap& symbols, bool derived) {
     try {
         const numeric value = real_value(expression, symbols);
         const double size = std::fabs(value.to_double());  // 1e-300 itself is in range, though its double is below it
-        if (!value.is_zero() && !(size >= 1e-300 && size <= 1e300))
+        const double least = derived || value.is_zero() ? 0 : 1e-300;
+        if (!(size >= least && size <= 1e300))
             source.fail(at, fmt::format("{} must be 0, or of a size between 1e-300 and 1e300", formula));
         return value;
     } catch (const NoValue& error) {

@@ -24,8 +24,9 @@ long evaluate_whole(const Source& source, const Syntax& formula, const Scope& sc
 GiNaC::ex parse_expression(const Source& source, const Text& text, const Scope& scope);
 
 // The value of what was parsed, its symbols replaced by numbers. InputError at `at`, with the name of the formula, when
-// it is not a real number that a double can hold with room to spare: 0, or of a size between 1e-300 and 1e300.
+// it is not a real number that a double can hold with room to spare: 0, or of a size between 1e-300 and 1e300. What
+// nobody wrote, `derived`, may be smaller.
 GiNaC::numeric value_in_range(const Source& source, Position at, const GiNaC::ex& expression,
-                              const std::string& formula, const GiNaC::exmap& symbols = {});
+                              const std::string& formula, const GiNaC::exmap& symbols = {}, bool derived = false);
 
 }  // namespace lobatto

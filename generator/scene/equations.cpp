@@ -49,9 +49,9 @@ void SystemReader::follow_equations(std::set<std::size_t>& missing) {
                 rate_of_change(equation.solution, scene_).subs(start, GiNaC::subs_options::no_pattern);
             const std::string& name = scene_.coordinates[k].written;
             value_in_range(source_, equation.at, scene_.initial_position[k], "the initial position of " + name,
-                           parameter_values_);
+                           parameter_values_, true);
             value_in_range(source_, equation.at, scene_.initial_rate[k], "the initial velocity of " + name,
-                           parameter_values_);
+                           parameter_values_, true);
             scene_.coordinates[k].rate_at = equation.at;
             scene_.coordinates[k].follows = true;
             missing.erase(k);

@@ -140,6 +140,12 @@ TEST_CASE("starts of eliminated coordinates agree with their equations, or are l
     CHECK(says(refusal_of(head + "x = { position = 1 }\ny = {}\n" + tail), "has no initial velocity or momentum"));
     CHECK(says(refusal_of(head + "x = {}\ny = {}\nz = {}\n" + tail),
                "z has no start: add position = 1 and velocity = 0, or a constraint that tells it, as in \"z = ...\""));
+    // So far out that the position is below all doubles.
+    for (const char* start : {"{}", "{ position = 0, velocity = 0 }"})
+        CHECK(refusal_of(std::string("lagrangian = \"(x'^2 + y'^2)/2 - y\"\n[coordinates]\n"
+                                     "x = { position = 0, velocity = 3 }\ny = ") +
+                         start + "\n[constraints]\nwire = \"y = exp(-1000*(x - 2)^2)\"\n[run]\nstep = 0.1\nuntil = 1\n")
+                  .empty());
     // Also with values that are set after the derivation.
     const auto with_length = [](const std::string& start) {
         Scene scene = follower_scene(

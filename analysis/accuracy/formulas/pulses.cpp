@@ -7,10 +7,12 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <optional>
 #include <set>
 #include <string>
 
 #include "analysis/accuracy/formulas/bends.hpp"
+#include "analysis/tape.hpp"
 
 namespace lobatto {
 
@@ -24,6 +26,7 @@ constexpr std::size_t samples = 8192;  // of what is no polynomial in time
 constexpr double real = 1e-9;          // |Im| of a real root, relative
 constexpr double multiple = 1e-3;      // the same of a multiple one, as rounding splits it
 constexpr double tiny = 0x1p-40;
+constexpr double high_power = 4;  // the least one that is a pulse
 
 // All roots of c_0 + c_1 x + ... by the iteration of Durand and Kerner.
 std::vector<std::complex<double>> roots_of(std::vector<double> c) {
@@ -63,14 +66,14 @@ public:
         each_in_time(formula, [this](const ex& part, const ex& u) {
             const bool is_function = GiNaC::is_a<GiNaC::function>(part);
             const std::string name = is_function ? GiNaC::ex_to<GiNaC::function>(part).get_name() : "";
-            const bool is_pole = !is_function && GiNaC::is_a<GiNaC::numeric>(part.op(1)) &&
-                                 GiNaC::ex_to<GiNaC::numeric>(part.op(1)).is_negative();
+            const bool is_power = !is_function && GiNaC::is_a<GiNaC::numeric>(part.op(1));
+            const double exponent = is_power ? GiNaC::ex_to<GiNaC::numeric>(part.op(1)).to_double() : 0;
             if (is_table_value(part))
                 of_table(spline_in(part), u);
             else if (u.is_polynomial(t_))
-                of_polynomial(u.expand(), name, is_pole);
+                of_polynomial(u.expand(), name, exponent);
             else
-                of_samples(u, name, is_pole);
+                of_samples(u, name, exponent);
         });
     }
 
@@ -152,7 +155,12 @@ private:
         return c;
     }
 
-    void of_polynomial(const ex& u, const std::string& name, bool is_pole) {
+    // Of |u|^k where |u| is largest: on this width it falls to 1/e of it.
+    void add_power(double time, double u, double curvature, double exponent) {
+        if (u * curvature < 0) add(time, std::sqrt(-2 * u / (exponent * curvature)));
+    }
+
+    void of_polynomial(const ex& u, const std::string& name, double exponent) {
         const std::vector<double> c = coefficients_of(u);
         if (c.empty()) return;
         const auto slope = [](const std::vector<double>& of) {
@@ -180,9 +188,13 @@ private:
             for (const auto& root : roots_of(c))
                 if (std::fabs(root.imag()) <= real * std::abs(root))
                     add(root.real(), 1 / std::fabs(at(first, root.real())));
-        if (is_pole)
+        if (exponent < 0)
             for (const auto& root : roots_of(c))
                 if (root.imag() > 0) add(root.real(), root.imag());
+        if (exponent >= high_power)
+            for (const auto& root : roots_of(first))
+                if (std::fabs(root.imag()) <= multiple * std::abs(root))
+                    add_power(root.real(), at(c, root.real()), at(slope(first), root.real()), exponent);
     }
 
     static const Spline& spline_in(const ex& table) {
@@ -203,6 +215,10 @@ private:
     double time_of_sample(std::size_t i) const { return begin_ + static_cast<double>(i) * ((end_ - begin_) / samples); }
     std::vector<double> samples_of(const ex& u) const {
         std::vector<double> values;
+        if (const std::optional<Tape> tape = Tape::of(u, std::vector{t_})) {
+            for (std::size_t i = 0; i <= samples; ++i) values.push_back((*tape)({time_of_sample(i)}));
+            return values;
+        }
         for (std::size_t i = 0; i <= samples; ++i) {
             const ex value = u.subs(t_ == GiNaC::numeric(time_of_sample(i))).evalf();
             const bool is_number = GiNaC::is_a<GiNaC::numeric>(value) && GiNaC::ex_to<GiNaC::numeric>(value).is_real();
@@ -212,11 +228,12 @@ private:
     }
 
     // Of any u(t): from its values at many times.
-    void of_samples(const ex& u, const std::string& name, bool is_pole) {
-        const double distance = (end_ - begin_) / samples, sign = name == "exp" ? -1 : 1;
-        if (name != "exp" && !is_pole && !is_switch(name)) return;
+    void of_samples(const ex& u, const std::string& name, double exponent) {
+        const bool is_pole = exponent < 0, is_high = exponent >= high_power;
+        const double distance = (end_ - begin_) / samples, sign = name == "exp" || is_high ? -1 : 1;
+        if (name != "exp" && !is_pole && !is_high && !is_switch(name)) return;
         std::vector<double> values = samples_of(u);
-        for (double& value : values) value = is_pole ? std::fabs(value) : value;
+        for (double& value : values) value = is_pole || is_high ? std::fabs(value) : value;
         for (std::size_t i = 1; i + 1 < values.size() && pulses_.size() < most_pulses; ++i) {
             const double time = time_of_sample(i);
             if (is_switch(name)) {
@@ -225,7 +242,9 @@ private:
             }
             if (!(sign * values[i] <= sign * values[i - 1] && sign * values[i] < sign * values[i + 1])) continue;
             const double curvature = sign * (values[i - 1] - 2 * values[i] + values[i + 1]) / (distance * distance);
-            if (curvature > 0)
+            if (is_high)
+                add_power(time, values[i], -curvature, exponent);
+            else if (curvature > 0)
                 add(time, name == "exp" ? std::sqrt(2 / curvature) : std::sqrt(2 * values[i] / curvature));
         }
     }
