@@ -73,12 +73,14 @@ Steps steps_of(const Scene& scene, const Overrides& overrides) {
 Steps steps_of_run(const Scene& scene, const Overrides& overrides) {
     const Steps steps = steps_of(scene, overrides);
     const double until = scene.evaluate(scene.run.until, "the end time").to_double();
-    if (steps.count == 0 && until > 0)
-        throw InputError(
-            fmt::format("{}: the step {:.6g} is longer than the run, which ends at {:.6g}, so that not one step would "
-                        "be taken; make the step smaller or the end time later",
-                        overrides.step.empty() ? scene.path : "--step",
-                        scene.evaluate(scene.run.step, "the step").to_double(), until));
+    if (steps.count == 0 && until > 0) {
+        const std::string what = fmt::format(
+            "the step {:.6g} is longer than the run, which ends at {:.6g}, so that not one step would be "
+            "taken; make the step smaller or the end time later",
+            scene.evaluate(scene.run.step, "the step").to_double(), until);
+        if (overrides.step.empty() && overrides.until.empty()) scene.source.fail(scene.run.step_at, what);
+        throw InputError((overrides.step.empty() ? "--until: " : "--step: ") + what);
+    }
     return steps;
 }
 

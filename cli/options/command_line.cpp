@@ -242,6 +242,12 @@ void CommandLine::run(int argc, char** argv) {
         if (app_->get_subcommands().empty()) std::cout << app_->help();
     } catch (const CLI::Success& help_or_version) {
         app_->exit(help_or_version);  // prints it
+    } catch (const CLI::RequiredError& error) {
+        // A misspelt option says more than what is missing.
+        const auto chosen = app_->get_subcommands();
+        for (const std::string& word : chosen.empty() ? std::vector<std::string>() : chosen.front()->remaining())
+            if (word.starts_with("--")) throw complaint("The following argument was not expected: " + word);
+        throw complaint(error.what());
     } catch (const CLI::ParseError& error) {
         throw complaint(error.what());
     }

@@ -157,8 +157,9 @@ void SystemReader::read_constraint(const Entry& entry) {
 
 void SystemReader::require_freedom(Position at, const std::string& or_else) const {
     if (scene_.constraints.size() >= scene_.coordinates.size())
-        fail(at, fmt::format("{} constraints on {} coordinates up to here: nothing is left that could move{}",
-                             scene_.constraints.size(), scene_.coordinates.size(), or_else));
+        fail(at, fmt::format("{} constraint{} on {} coordinate{} up to here: nothing is left that could move{}",
+                             scene_.constraints.size(), scene_.constraints.size() == 1 ? "" : "s",
+                             scene_.coordinates.size(), scene_.coordinates.size() == 1 ? "" : "s", or_else));
 }
 
 }  // namespace lobatto

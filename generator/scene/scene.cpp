@@ -205,6 +205,7 @@ private:
         const Scope scope = system_.scope_of(step != nullptr ? "the step" : "the period", false);
         GiNaC::numeric h = 0;
         scene_.run.step = system_.read_formula(length, scope, &h);
+        scene_.run.step_at = length.value.at;
         if (!h.is_positive())
             fail(length.value.at, fmt::format("{} is {}; it must be positive", scope.formula, shown(h)));
         if (per_period != nullptr) {

@@ -52,6 +52,7 @@ struct Run {
     static constexpr double least_error = 1e-28, largest_error = 0.1;  // that can be asked for
 
     GiNaC::ex step;               // h > 0; in parameters
+    Position step_at = {};        // where it is written
     GiNaC::ex until;              // end time, >= 0; in parameters
     double error = 0;             // that is wanted, relative to the amplitude of the motion; 0: nothing is said
     bool beyond_horizon = false;  // goes on where nothing of the motion is left: statistics of chaos

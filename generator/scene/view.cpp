@@ -74,9 +74,10 @@ void SystemReader::read_figure(const Entry& entry) {
     const Value& places = shape->value;
     if (places.kind != Value::Kind::list || places.items.size() < 2 || places.items.size() > most_corners)
         fail(places.at,
-             fmt::format("{} must be a list: [\"x\", \"y\"] of a point or circle, [[0, 0], [\"x\", \"y\"]] of "
-                         "a line or spring",
-                         shape->key));
+             fmt::format(
+                 "{} must be a list of two and more: [\"x\", \"y\"] of a point or circle, [[0, 0], [\"x\", \"y\"]] of "
+                 "a line or spring",
+                 shape->key));
     const std::vector<Value> one{places};
     const long count = count_of(entry, table.find("count"), array, "figure");
     Scope scope = scope_of("the figure " + array.name, true);

@@ -72,6 +72,8 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
         if table:
             lines.append(f"[{heading}]")
             lines += [f"{name} = {_value(value)}" for name, value in table.items()]
+    if isinstance(inputs, str):
+        raise InputError(f"inputs is a list of names: inputs=[{inputs!r}]")
     inputs = list(inputs)
     for name in inputs:
         if name in moving or name not in variables:

@@ -324,6 +324,6 @@ TEST_CASE("joints that leave nothing that could move are refused where the last 
                 "[joints]\nfirst = { type = \"hinge\", bodies = [\"ground\", \"a\"], point = [0, 0, 0], axis = [0, 0, "
                 "1] }\n"
                 "second = { type = \"hinge\", bodies = [\"ground\", \"a\"], point = [0, 0, 1], axis = [0, 0, 1] }\n") ==
-        "top.toml:6:1: 5 constraints on 1 coordinates up to here: nothing is left that could move, or they depend on "
+        "top.toml:6:1: 5 constraints on 1 coordinate up to here: nothing is left that could move, or they depend on "
         "one another, as those of hinges with parallel axes do; write plane bodies, or leave out a joint");
 }
