@@ -95,6 +95,7 @@ std::string gnuplot_text(const std::string& text) {
         const bool is_control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
         // A line's end would end the text, and the rest be a command.
         result += c == '\'' ? "''" : std::string(1, is_control ? ' ' : c);
+        if (result.ends_with("]]>")) result.insert(result.size() - 1, " ");  // gnuplot writes it as it is into an SVG
     }
     return result + "'";
 }

@@ -318,6 +318,7 @@ private:
     // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number, and of the
     // time, in which a position goes its way and a velocity changes.
     bool is_rounding(const Sample& sample, int e) {
+        if (e < 0) __builtin_unreachable();  // what g++ would warn of
         if (!sample.is_exact) return false;
         real largest = real(0), row[1 + 2 * n], velocity[n], values[K::events];
         for (int i = 0; i < sample_count; ++i)
