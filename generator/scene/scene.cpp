@@ -79,7 +79,7 @@ private:
             if (fits && !(c == '_' && name.ends_with('_'))) name += c;
             if (!fits && !name.ends_with('_')) name += '_';
         }
-        return is_identifier(name) ? name : "scene_" + name;
+        return is_identifier(name) ? name : (name.starts_with('_') ? "scene" : "scene_") + name;
     }
 
     int splitting_stages_of(const Entry& entry) const {

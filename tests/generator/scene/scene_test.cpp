@@ -196,6 +196,7 @@ TEST_CASE("a name of a file becomes a C identifier") {
     CHECK(name_of("a/b/three-body (new).toml") == "three_body_new_");
     CHECK(name_of("3body.toml") == "scene_3body");
     CHECK(name_of("") == "scene_");
+    CHECK(name_of("\xc3\xa9t\xc3\xa9.toml") == "scene_t_");
 }
 
 TEST_CASE("a Lagrangian of several lines knows the place of every character") {
