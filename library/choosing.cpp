@@ -56,8 +56,8 @@ void refuse_method(const Settings& settings) {
 void check_budget(double seconds, const std::string& written) {
     if (!(seconds >= least_budget && seconds <= most_budget))
         throw lobatto::InputError(fmt::format(
-            "--budget: {} is {} for one measurement, which needs a compiled kernel; give 1s to 24h, as in --budget 30s",
-            written, seconds > most_budget ? "too much" : "too little"));
+            "--budget: {} is {}; give 1s to 24h, as in --budget 30s", written,
+            seconds > most_budget ? "too much" : "too little for one measurement, which needs a compiled kernel"));
 }
 
 ChangedScene measurable(const Scene& scene, const Settings& settings, const std::string& command) {

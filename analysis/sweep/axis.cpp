@@ -182,7 +182,7 @@ VariedName varied_name(const Scene& scene, const std::string& name, const std::s
                                                             {"splitting", Role::splitting},
                                                             {"tolerance", Role::tolerance}};
     for (const auto& [setting, role] : settings) {
-        names.push_back(setting);
+        if (what == "name") names.push_back(setting);  // not of the columns of starts
         if (name == setting) return {role, 0, name};
     }
     for (const Parameter& constant : scene.constants)

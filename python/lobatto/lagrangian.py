@@ -54,6 +54,12 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
     parameters that ``Stepper.set`` may change before each step. ``extra``: more of a scene file, as text. Scenes with
     arrays are written as such a text: ``Scene.from_text``.
     """
+    if not isinstance(lagrangian, str):
+        raise InputError(f"the Lagrangian is a text, such as \"m*q'^2/2 - k*q^2/2\", not {lagrangian!r}")
+    for name, table in ("method", method), ("output", output):
+        if table is not None and not isinstance(table, dict):
+            raise InputError(f"{name} is a table, such as {name}=dict({'points=4' if name == 'method' else 'every=10'}), "
+                             f"not {table!r}")
     moving = set(re.findall(r"([A-Za-z_]\w*)'", re.sub("#[^\n]*", "", lagrangian)))  # without comments
     lines = []
     if title:

@@ -38,6 +38,8 @@ def run(scene, *, measure=True, companion="", beyond_horizon=False, progress=Non
 
 def _columns(starts):
     """Arrays of one length."""
+    if not hasattr(starts, "items"):
+        raise InputError("starts are columns with their names, such as {\"q\": [0.1, 0.2]}, not " + repr(starts))
     for name, values in starts.items():
         if numpy.ma.is_masked(values):
             raise InputError(f"starts: {name} has masked values; leave these trajectories out (.compressed())")

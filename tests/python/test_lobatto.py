@@ -326,6 +326,19 @@ def test_ctrl_c_ends_verify():
         lobatto.verify(scene)
 
 
+def test_wrong_types_are_wrong_input():
+    oscillator = lobatto.Lagrangian("q'^2/2 - q^2/2", q=1, until=1)
+    for wrong, match in ((lambda: lobatto.Lagrangian("q'^2/2", q=1, method="gauss"), "method is a table"),
+                         (lambda: lobatto.Lagrangian(b"q'^2/2", q=1), "the Lagrangian is a text"),
+                         (lambda: lobatto.Lagrangian("q'^2/2 + push*q", q=1, push=0, inputs="push"), "a list of names"),
+                         (lambda: lobatto.sweep(oscillator, (x for x in [1, 2])), "columns with their names"),
+                         (lambda: lobatto.sweep(oscillator, {"r": [1, 2]}), "can be varied: q, q'"),
+                         (lambda: lobatto.sweep(oscillator, {"q": [1]}, threads=10**9), "1024 are the most"),
+                         (lambda: lobatto.tune(oscillator, 1e-6, budget=float("inf")), "too much; give 1s to 24h")):
+        with pytest.raises(lobatto.InputError, match=match):
+            wrong()
+
+
 def test_steps_tell_what_they_met():
     scene = lobatto.Scene(str(SCENES / "bouncing_ball.toml"))
     ball, run, met = lobatto.Stepper(scene), lobatto.run(scene), []
