@@ -131,7 +131,6 @@ private:
     Id intern(Node node);
     bool leads_with_minus(Id id) const;
     Id negate_terms(Id sum);
-    int binary_content(Id sum) const;
     void append_factor(std::vector<Id>& factors, Id base, int exponent);
 
     std::vector<Node> nodes_;

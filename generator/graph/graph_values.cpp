@@ -3,6 +3,7 @@
 #include <cln/cln.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <numeric>
 #include <optional>
@@ -176,32 +177,11 @@ Id Graph::negate_terms(Id sum) {
     return add(terms);
 }
 
-// The binary exponent of the largest rational factor of a term of a sum.
-int Graph::binary_content(Id sum) const {
-    cln::cl_R largest = 0;
-    for (const Id term : (*this)[sum].operands) {
-        const Node& node = (*this)[term];
-        cln::cl_R factor = 1;
-        for (const Id part : node.op == Op::multiply ? node.operands : std::vector<Id>{term})
-            if (is_constant(part) && is_rational(constant_of(part).value)) factor = factor * constant_of(part).value;
-        largest = cln::max(largest, cln::abs(factor));
-    }
-    return static_cast<int>(cln::float_exponent(cln::cl_float(largest, format())));
-}
-
 // GiNaC chooses between (a - b) (c - d) and (b - a) (d - c) by address; here each sum has a sign of its own.
 void Graph::append_factor(std::vector<Id>& factors, Id base, int exponent) {
     if (leads_with_minus(base)) {
         base = negate_terms(base);
         if (exponent % 2 != 0) factors.push_back(number(-1));
-    }
-    // GiNaC takes (1 - x^2/1.234567^2)^30 for (1524155677489 - 10^12 x^2)^30/1524155677489^30: powers that no number
-    // type may hold. A power of two goes from each term to the front, which changes no rounding.
-    constexpr int most_content = 64;  // bits
-    const int content = (*this)[base].op == Op::add && std::abs(exponent) > 1 ? binary_content(base) : 0;
-    if (std::abs(content * exponent) > most_content) {
-        base = multiply({constant(cln::expt(cln::cl_RA(2), -content)), base});
-        factors.push_back(constant(cln::expt(cln::cl_RA(2), content * exponent)));
     }
     factors.push_back(power(base, exponent));
 }
@@ -215,6 +195,46 @@ GiNaC::exvector parts_of(const GiNaC::ex& product) {
 
 std::pair<GiNaC::ex, GiNaC::ex> base_and_exponent(const GiNaC::ex& factor) {
     return GiNaC::is_a<GiNaC::power>(factor) ? std::pair(factor.op(0), factor.op(1)) : std::pair(factor, GiNaC::ex(1));
+}
+
+// About log2 |x|.
+double bits_of(const GiNaC::ex& number) {
+    const auto x = cln::the<cln::cl_R>(GiNaC::ex_to<GiNaC::numeric>(number).to_cl_N());
+    return cln::zerop(x) ? 0 : static_cast<double>(cln::float_exponent(cln::cl_float(x, format())));
+}
+// That of the largest number in front of a term.
+double bits_of_terms(const GiNaC::ex& sum) {
+    double largest = 0;
+    for (const GiNaC::ex& term : sum) {
+        double bits = 0;
+        for (const GiNaC::ex& part : parts_of(term))
+            if (GiNaC::is_a<GiNaC::numeric>(part)) bits += bits_of(part);
+        largest = std::fmax(largest, bits);
+    }
+    return largest;
+}
+
+// GiNaC takes (1 - x^2/1.234567^2)^30 for (1524155677489 - 10^12 x^2)^30/1524155677489^30: numbers that no number type
+// holds, though their product is of order 1. For each factor, the power of two by which its terms are multiplied, so
+// that the number in front of the product is of order 1 again. That changes no rounding. Empty: nothing is so large.
+std::vector<int> scales_of(const GiNaC::exvector& factors) {
+    constexpr double large = 64;  // bits
+    double front = 0, inside = 0;
+    std::vector<double> bits(factors.size());
+    for (std::size_t i = 0; i < factors.size(); ++i) {
+        const auto [base, exponent] = base_and_exponent(factors[i]);
+        if (GiNaC::is_a<GiNaC::numeric>(factors[i])) {
+            front += bits_of(factors[i]);
+        } else if (GiNaC::is_a<GiNaC::add>(base) && exponent.info(GiNaC::info_flags::integer)) {
+            bits[i] = bits_of_terms(base);
+            inside += bits[i] * GiNaC::ex_to<GiNaC::numeric>(exponent).to_double();
+        }
+    }
+    if (std::fabs(front) <= large || inside == 0) return {};
+    const double part = std::clamp(-front / inside, 0.0, 1.0);
+    std::vector<int> scales;
+    for (const double one : bits) scales.push_back(-static_cast<int>(std::lround(part * one)));
+    return scales;
 }
 
 // Whether a product holds one over a factor of `base`: 1/x, where the base is x/a.
@@ -277,7 +297,19 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
             id = add(terms);
         } else if (GiNaC::is_a<GiNaC::mul>(e)) {
             std::vector<Id> factors;
-            for (const auto& factor : factors_of(e)) append_factor(factors, self(self, factor), 1);
+            const GiNaC::exvector parts = factors_of(e);
+            const std::vector<int> scales = scales_of(parts);
+            for (std::size_t i = 0; i < parts.size(); ++i) {
+                if (scales.empty() || scales[i] == 0) {
+                    append_factor(factors, self(self, parts[i]), 1);
+                    continue;
+                }
+                const auto [base, exponent] = base_and_exponent(parts[i]);
+                const int n = GiNaC::ex_to<GiNaC::numeric>(exponent).to_int();
+                const auto power_of_two = [&](int bits) { return constant(cln::expt(cln::cl_RA(2), bits)); };
+                append_factor(factors, multiply({power_of_two(scales[i]), self(self, base)}), n);
+                factors.push_back(power_of_two(-n * scales[i]));
+            }
             id = multiply(factors);
         } else if (GiNaC::is_a<GiNaC::power>(e)) {
             const Id base = self(self, e.op(0));

@@ -61,7 +61,8 @@ TEST_CASE("high powers of sums with decimals hold no number that a double cannot
              GiNaC::pow(1 - x * x / GiNaC::pow(decimal(1234567, 1000000), 2), 30),
              GiNaC::pow(1 + x * x / GiNaC::pow(decimal(123456789, 100000000), 2), -20),
              GiNaC::pow(x * decimal(1, 100000000) - decimal(1, 700000000), 47) * GiNaC::pow(10, 8 * 47),
-             GiNaC::pow(decimal(1234567, 10000000) - x, 47) * (1 + x)}) {
+             GiNaC::pow(decimal(1234567, 10000000) - x, 47) * (1 + x),
+             GiNaC::pow(x * x + GiNaC::pow(GiNaC::ex(10), -20), -3)}) {
         Inputs g;
         const Id id = g.graph.from(e, {{x, g.x}});
         for (const Id node : g.graph.topological({id})) {
@@ -74,6 +75,14 @@ TEST_CASE("high powers of sums with decimals hold no number that a double cannot
         CHECK(cln::double_approx(g.value(id, cln::cl_RA(3) / 10)) ==
               doctest::Approx(GiNaC::ex_to<GiNaC::numeric>(value).to_double()).epsilon(1e-14));
     }
+}
+
+TEST_CASE("powers of sums keep the size that they are written with") {
+    // At x = 1e-6 a smaller sum would underflow.
+    const GiNaC::symbol x("x");
+    Inputs g;
+    const Id id = g.graph.from(3 * GiNaC::pow(1 + 1000000 * x, 64), {{x, g.x}});
+    CHECK(g.text(id) == "3*(1000000*x + 1)^64");
 }
 
 TEST_CASE("the order of terms is that of the inputs, not of construction") {
