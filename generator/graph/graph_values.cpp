@@ -197,6 +197,13 @@ std::pair<GiNaC::ex, GiNaC::ex> base_and_exponent(const GiNaC::ex& factor) {
     return GiNaC::is_a<GiNaC::power>(factor) ? std::pair(factor.op(0), factor.op(1)) : std::pair(factor, GiNaC::ex(1));
 }
 
+// GiNaC takes numbers in and out of sums in an order that differs from process to process, so that -2 may be -2.000...
+cln::cl_R exact_where_it_is(const cln::cl_R& x) {
+    if (cln:: instanceof (x, cln::cl_RA_ring)) return x;
+    const cln::cl_RA near = cln::rationalize(x);
+    return cln::denominator(near) < 1000000 ? near : x;
+}
+
 // About log2 |x|.
 double bits_of(const GiNaC::ex& number) {
     const auto x = cln::the<cln::cl_R>(GiNaC::ex_to<GiNaC::numeric>(number).to_cl_N());
@@ -283,7 +290,7 @@ Id Graph::from(const GiNaC::ex& expression, const GiNaC::exmap& inputs) {
         if (GiNaC::is_a<GiNaC::numeric>(e)) {
             const GiNaC::numeric& value = GiNaC::ex_to<GiNaC::numeric>(e);
             if (!value.is_real()) throw std::logic_error("a complex number in a real expression");
-            id = constant(cln::the<cln::cl_R>(value.to_cl_N()));
+            id = constant(exact_where_it_is(cln::the<cln::cl_R>(value.to_cl_N())));
         } else if (GiNaC::is_a<GiNaC::symbol>(e)) {
             const auto place = inputs.find(e);
             if (place == inputs.end())

@@ -73,10 +73,15 @@ TEST_CASE("derive prints the same bytes in every process, in every notation" * d
                      scene_with("(a-b)*x'^2/2 + (b-c)*x'*y' + (a+c)*y'^2 - (x-y)*(y-a)*(x-c)^3/(a-b)",
                                 "x = { position = 1, velocity = 0 }\ny = { position = 1, velocity = 0 }\n",
                                 "a = 4\nb = 2\nc = 3\n"));
-    for (const std::string option : {"", "--latex", "--json"}) {
+    // Numbers, which it takes in and out of sums in an order of addresses, too.
+    const std::string numbers = LOBATTO_SOURCE_DIR "/scenes/gyroscopic_pendulum.toml";
+    for (const auto& [option, scene] : {std::pair<std::string, std::string>("", folder / "signs.toml"),
+                                        {"--latex", folder / "signs.toml"},
+                                        {"--json", folder / "signs.toml"},
+                                        {"--json", numbers}}) {
         std::set<std::string> outputs;
         for (int process = 0; process < 4; ++process) {
-            std::vector<std::string> arguments = {"derive", folder / "signs.toml"};
+            std::vector<std::string> arguments = {"derive", scene};
             if (!option.empty()) arguments.push_back(option);
             const test::Finished shown = lobatto_program(arguments);
             CHECK(shown.exit_code == 0);

@@ -77,6 +77,14 @@ TEST_CASE("high powers of sums with decimals hold no number that a double cannot
     }
 }
 
+TEST_CASE("a number of many digits that is a simple fraction is this fraction") {
+    Graph graph;
+    const cln::cl_F third = cln::cl_float(cln::cl_RA(1) / 3, cln::float_format(number_digits));
+    CHECK(graph.from(GiNaC::numeric(cln::cl_N(third)), {}) == graph.number(1, 3));
+    CHECK(graph.from(GiNaC::numeric(cln::cl_N(6 * third)), {}) == graph.number(2));
+    CHECK(graph.from(GiNaC::numeric(cln::cl_N(cln::sqrt(third))), {}) != graph.number(1, 3));
+}
+
 TEST_CASE("powers of sums keep the size that they are written with") {
     // At x = 1e-6 a smaller sum would underflow.
     const GiNaC::symbol x("x");
