@@ -224,6 +224,8 @@ void Companion::take(CompanionPlace& place, const Segment& part) {
         if (count == 0) {
             take_finely(place, here, whole_size);
             ++done;
+            if (done == part.taken && place.status == LOBATTO_OK && place.before.time.front() == here)
+                contacts_.divide_rest(place, whole_size);   // it was taken in one piece
             if (parts_ == 1 && place.status == LOBATTO_OK)  // the roundings of its parts do not add up
                 place.time[0] = from + static_cast<double>(done) * size;
         } else {

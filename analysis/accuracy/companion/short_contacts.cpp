@@ -12,6 +12,7 @@ namespace {
 constexpr double graded_at_contacts = 2;      // as at pulses; more of other steps would change their energy
 constexpr double notable_change = 64;         // times the usual one
 constexpr double most_parts_on_trial = 1000;  // of a step: a contact that is shorter matters unseen
+constexpr double shortest_rest = 1e-6;        // of a step: what is left after a cut
 constexpr double undivided = 1.999;           // of a step: what is shorter is not in two parts yet
 
 }  // namespace
@@ -69,11 +70,32 @@ bool ShortContacts::matters(CompanionPlace& place, const std::vector<double>& st
     const double size = std::fabs(step.front()), parts = std::ceil(2 * size / contact.width),
                  to_its_end = std::fabs(contact.time - place.before.time.front()) + contact.width / 2;
     if (!(parts <= most_parts_on_trial)) return true;
-    const std::vector<double> change =
-        change_in_parts(place, step, 1 + static_cast<int>(std::ceil(to_its_end / size)), static_cast<int>(parts) + 1);
+    return is_notable(
+        change_in_parts(place, step, 1 + static_cast<int>(std::ceil(to_its_end / size)), static_cast<int>(parts) + 1));
+}
+
+bool ShortContacts::is_notable(const std::vector<double>& change) const {
     for (std::size_t i = 0; i < change.size(); ++i)
-        if (!(change[i] <= notable_change * usual_change_[i])) return true;
+        if (usual_change_.empty() || !(change[i] <= notable_change * usual_change_[i])) return true;
     return false;
+}
+
+void ShortContacts::divide_rest(CompanionPlace& place, const std::vector<double>& step) const {
+    const double from = place.before.time.front(), cut = place.cuts.last(), way = cut - from,
+                 first = way + (step.front() - way) / 2;
+    if (!is_sought() || !std::isfinite(cut) ||
+        !(std::fabs(step.front() - way) > shortest_rest * std::fabs(step.front())))
+        return;
+    const CompanionPlace::State whole = place.state();
+    const std::vector<double> there = place.rounded_row();
+    place.go_back(place.before);
+    for (const std::vector<double>& part : {as_parts({first}, place.stepper.parts()), minus(step, first)}) {
+        place.set_step(part, request_.whole_parameters);
+        place.advance(1, request_.tolerance);
+    }
+    std::vector<double> change = place.rounded_row();
+    for (std::size_t i = 0; i < change.size(); ++i) change[i] = std::fabs(change[i] - there[i]);
+    if (place.status != LOBATTO_OK || !is_notable(change)) place.go_back(whole);
 }
 
 // What it changes in q and p to take so many steps from place.before, each in so many parts.

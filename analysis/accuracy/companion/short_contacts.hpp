@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What lies between two cuts at walls and switches that are near to one another, as a contact that begins and ends
-// within a step. In one piece of a step it has the same error in the run and in its companion; so the companion takes
-// it in parts, where that matters.
+// within a step, or between a cut and the end of a step. In one piece of a step it has the same error in the run and in
+// its companion; so the companion takes it in parts, where that matters.
 #pragma once
 
 #include <cstddef>
@@ -29,10 +29,14 @@ public:
     // Around a step that is taken by itself, from place.before. Whether it met one that matters.
     void begin(CompanionPlace& place, double from) const;
     bool is_met(CompanionPlace& place, const std::vector<double>& step);
+    // After a step that ends where one of the run does: what is left of it after a cut is then the same piece in both,
+    // with the same error, however few derivatives the force has there. It is taken in two, where that matters.
+    void divide_rest(CompanionPlace& place, const std::vector<double>& step) const;
     // The next step that nothing cuts tells again what halves of such steps change.
     void look_at_usual_change() { looks_at_usual_ = true; }
 
 private:
+    bool is_notable(const std::vector<double>& change) const;
     std::optional<Pulse> found(CompanionPlace& place, const std::vector<double>& step) const;
     bool matters(CompanionPlace& place, const std::vector<double>& step, const Pulse& contact) const;
     std::vector<double> change_in_parts(CompanionPlace& place, const std::vector<double>& step, int steps,
