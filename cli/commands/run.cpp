@@ -365,7 +365,7 @@ void run(const RunOptions& options) {
         print_events(scene, result, observers.counts, files.events_path());
         const double states = observers.counts[0];
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
-        if (!run.steps.reaches_end)
+        if (!run.steps.reaches_end && result.status == LOBATTO_OK && result.stop < 0)
             fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
     }
     fail_where_it_failed(scene, result, verdict, files);

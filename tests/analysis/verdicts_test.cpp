@@ -88,6 +88,10 @@ TEST_CASE("a Lagrangian that jumps has no motion there, and a run says so") {
     CHECK(small.err.find(
               "the Lagrangian jumps, by about 0.001, where if in the Lagrangian (line 1 column 38) goes from one "
               "piece to the other") != std::string::npos);
+    // In any unit.
+    std::string tiny = jumping("(x'/1e-3)^2/2 - (x/1e-3)^4/4 - 0.001*if(x/1e-3 > 0, 1, 0)");
+    tiny.replace(tiny.find("-1, velocity = 0.1"), 18, "-1e-3, velocity = 1e-4");
+    CHECK(run(tiny).err.find("the Lagrangian jumps") != std::string::npos);
 }
 
 TEST_CASE("a momentum that is a difference at rest has its velocity where the motion turns") {

@@ -27,6 +27,14 @@ public:
         symbols_.push_back(scene.time);
         variables_ = parameters;
         variables_.resize(symbols_.size());
+        sizes_.assign(symbols_.size(), 1);
+        const std::size_t n = scene.coordinates.size();
+        for (std::size_t k = 0; k < n; ++k) {
+            const double q = size_of(scene.initial_position[k]),
+                         v = scene.start == Start::velocity ? size_of(scene.initial_rate[k]) : 0;
+            sizes_[parameters_ + k] = q > 0 ? q : v > 0 ? v : 1;
+            sizes_[parameters_ + n + k] = v > 0 ? v : sizes_[parameters_ + k];
+        }
     }
 
     // The median jump where u = 0, and the size of the pieces there; nothing where that is not known.
@@ -41,7 +49,7 @@ public:
         if (!above || !below || !u || !slope) return std::nullopt;
         std::vector<std::pair<double, double>> found;
         for (int place = 0; place < tried_places; ++place) {
-            for (std::size_t i = parameters_; i < variables_.size(); ++i) variables_[i] = random();
+            for (std::size_t i = parameters_; i < variables_.size(); ++i) variables_[i] = sizes_[i] * random();
             const double rate = (*slope)(variables_);
             variables_[k] -= (*u)(variables_) / rate;
             const double a = (*above)(variables_), b = (*below)(variables_), jump = std::fabs(a - b);
@@ -61,12 +69,15 @@ private:
         }
         return std::nullopt;
     }
+    double size_of(const GiNaC::ex& start) const {
+        return std::fabs(scene_.evaluate(start, "the start").to_double());
+    }
     double random() { return 2 * static_cast<double>(generator_() >> 11) * 0x1p-53 - 1; }
 
     const Scene& scene_;
     std::size_t parameters_;
     std::vector<GiNaC::symbol> symbols_;
-    std::vector<double> variables_;
+    std::vector<double> variables_, sizes_;  // sizes: those of the start, in the unit of each
     std::mt19937_64 generator_{1};
 };
 
