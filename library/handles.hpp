@@ -87,7 +87,7 @@ inline const char* text(const std::vector<std::string>& list, std::size_t index)
     return found == nullptr ? nullptr : found->c_str();
 }
 
-// Every function of lobatto.h may be given NULL where a handle belongs: its status is that of a machine without memory.
+// Every function of lobatto.h may be given NULL where a handle belongs: its status is 4, as where memory is out.
 template <class Made>
 int status_of(const Made* handle) {
     return handle == nullptr ? 4 : handle->status;

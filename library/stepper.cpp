@@ -179,6 +179,7 @@ struct Stepper::Parts {
         const auto begin = static_cast<std::size_t>(table.first_input),
                    end = begin + static_cast<std::size_t>(table.inputs);
         const bool are_inputs = first >= begin && first + values.size() <= end;
+        const double step_before = last_step;
         const auto take = [&] {
             last_step = 0;
             if (!are_inputs) return restart();
@@ -188,7 +189,8 @@ struct Stepper::Parts {
             take();
         } catch (...) {
             parameters = before;
-            restart();
+            last_step = step_before;
+            if (!are_inputs || table.events == 0) restart();  // a kernel that watches has refused them itself
             throw;
         }
     }

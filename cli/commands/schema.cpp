@@ -22,8 +22,7 @@ void add_schema(CommandLine& program) {
         if (output->empty()) {
             fmt::print("{}", scene_schema());
         } else {
-            if (!is_standard_output(*output) && !output->ends_with(".json"))
-                throw InputError(fmt::format("-o: {} is no .json", *output));
+            require_ending(*output, ".json");
             keep_foreign(*output, "\"title\": \"a scene of lobatto\"");
             write_whole(*output, "the schema", scene_schema());
         }

@@ -146,8 +146,7 @@ std::vector<ViewChart> charts_of(const std::vector<Viewed>& all) {
 
 void view(const ViewCommand& options) {
     const std::string path = output_path(options.output, result_name(options.scenes.front()) + ".html");
-    if (!is_standard_output(path) && !path.ends_with(".html"))
-        throw InputError(fmt::format("-o: {} is no .html", path));
+    require_ending(path, ".html");
     for (const std::string& scene : options.scenes) keep_scene(scene, path);
     if (!options.video.empty()) {
         check_video_name(options.video);

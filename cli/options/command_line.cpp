@@ -246,7 +246,8 @@ void CommandLine::run(int argc, char** argv) {
         // A misspelt option says more than what is missing.
         const auto chosen = app_->get_subcommands();
         for (const std::string& word : chosen.empty() ? std::vector<std::string>() : chosen.front()->remaining())
-            if (word.starts_with("--")) throw complaint("The following argument was not expected: " + word);
+            if (word.starts_with("--") && word.size() > 2)
+                throw complaint("The following argument was not expected: " + word);
         throw complaint(error.what());
     } catch (const CLI::ParseError& error) {
         throw complaint(error.what());

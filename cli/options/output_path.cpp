@@ -55,6 +55,13 @@ void keep_scene(const std::string& scene, const std::string& path) {
                 fmt::format("{}: the result would overwrite the scene {}; give it another name", path, scene));
 }
 
+void require_ending(const std::string& path, const std::string& ending) {
+    std::error_code none;
+    const bool is_device = std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none);
+    if (!is_standard_output(path) && !is_device && !path.ends_with(ending))
+        throw InputError(fmt::format("-o: {} is no {}", path, ending));
+}
+
 namespace {
 
 // Of a file's name, in bytes: file systems have 255, and NAME.checkpoint.partial may stand beside it.
@@ -95,9 +102,11 @@ void keep_foreign(const std::string& path, const std::string& given_mark) {
     if (is_standard_output(path)) return;
     const std::size_t bytes = std::filesystem::path(path).filename().string().size();
     if (bytes > longest_name)
-        throw InputError(fmt::format(
-            "{}: the name of the file is {} bytes long; choose one of at most {}, for others are named after it", path,
-            bytes, longest_name));
+        throw InputError(
+            fmt::format("{}: the name of this file has {} bytes, and at most {} are possible, for others are named "
+                        "after it; choose a "
+                        "shorter name with -o",
+                        path, bytes, longest_name));
     if (!std::filesystem::is_regular_file(path, none)) return;
     const std::string begin = begin_of(path), mark = given_mark.empty() ? mark_of(path) : given_mark;
     const auto holds = [&](const std::string& part) { return begin.find(part) != std::string::npos; };

@@ -20,9 +20,12 @@ std::string result_name(const std::string& scene);
 // InputError when `path`, where a result is to go, is the scene itself.
 void keep_scene(const std::string& scene, const std::string& path);
 
+// InputError where `path` ends otherwise; a device is good under any name.
+void require_ending(const std::string& path, const std::string& ending);
+
 // InputError where a file that is not ours stands in the place of a result, or where its name is too long for the files
-// that stand beside it while it is written. `mark`: in lower case, what the beginning of ours has; empty: what all files
-// with this ending have.
+// that stand beside it while it is written. `mark`: in lower case, what the beginning of ours has; empty: what all
+// files with this ending have.
 void keep_foreign(const std::string& path, const std::string& mark = "");
 
 // --json: what a command reports as JSON, by its schema in docs/schemas/.

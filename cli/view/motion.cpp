@@ -22,6 +22,7 @@ namespace {
 
 constexpr std::size_t wanted_frames = 4000;  // at least, where steps can be filled
 constexpr int most_dense = 100;
+constexpr double rests = 1e-9;  // relative: what moves by less
 constexpr std::size_t most_plotted = 6, most_events = 2000;
 const char* const kind_names[] = {"point", "line", "spring", "circle"};
 
@@ -231,6 +232,7 @@ bool is_too_fast(const Scene& scene, const std::vector<std::vector<double>>& fra
             missed += std::fabs(q - before[first + k] - way);
             turned += std::fabs(way);
         }
+        if (high - low <= rests * std::fmax(std::fabs(low), std::fabs(high))) continue;
         const double steps = static_cast<double>(frames.size() - 1);
         if (missed / steps > 0.25 * (high - low) / 2) return true;
         if (scene.coordinates[k].unit == "rad" && turned / steps > 2) return true;

@@ -17,7 +17,7 @@ struct Viewed {
     std::vector<ViewChart> charts;
     std::string title;
     bool is_interrupted = false;
-    std::string failure;  // why the page does not show the motion to its end; empty: it does
+    std::string failure;  // why the page does not show the motion as it is, to its end; empty: it does
 };
 
 // `most_numbers`: of all channels together, which decides how large the page is. `progress` hears the steps done, and

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numeric>
 #include <optional>
 
@@ -209,38 +210,43 @@ double bits_of(const GiNaC::ex& number) {
     const auto x = cln::the<cln::cl_R>(GiNaC::ex_to<GiNaC::numeric>(number).to_cl_N());
     return cln::zerop(x) ? 0 : static_cast<double>(cln::float_exponent(cln::cl_float(x, format())));
 }
-// That of the largest number in front of a term.
-double bits_of_terms(const GiNaC::ex& sum) {
-    double largest = 0;
+// That of the least and of the largest number in front of a term, at least 0.
+std::pair<double, double> bits_of_terms(const GiNaC::ex& sum) {
+    double least = std::numeric_limits<double>::infinity(), largest = 0;
     for (const GiNaC::ex& term : sum) {
         double bits = 0;
         for (const GiNaC::ex& part : parts_of(term))
             if (GiNaC::is_a<GiNaC::numeric>(part)) bits += bits_of(part);
+        least = std::fmin(least, bits);
         largest = std::fmax(largest, bits);
     }
-    return largest;
+    return {std::fmax(least, 0), largest};
 }
 
 // GiNaC takes (1 - x^2/1.234567^2)^30 for (1524155677489 - 10^12 x^2)^30/1524155677489^30: numbers that no number type
 // holds, though their product is of order 1. For each factor, the power of two by which its terms are multiplied, so
-// that the number in front of the product is of order 1 again. That changes no rounding. Empty: nothing is so large.
+// that the number in front of the product comes near to 1, and the least one in the sum. That changes no rounding.
+// Empty: nothing is so large.
 std::vector<int> scales_of(const GiNaC::exvector& factors) {
     constexpr double large = 64;  // bits
-    double front = 0, inside = 0;
-    std::vector<double> bits(factors.size());
+    double front = 0, inside = 0, most = 0;
+    std::vector<std::pair<double, double>> bits(factors.size());
     for (std::size_t i = 0; i < factors.size(); ++i) {
         const auto [base, exponent] = base_and_exponent(factors[i]);
         if (GiNaC::is_a<GiNaC::numeric>(factors[i])) {
             front += bits_of(factors[i]);
         } else if (GiNaC::is_a<GiNaC::add>(base) && exponent.info(GiNaC::info_flags::integer)) {
+            const double n = GiNaC::ex_to<GiNaC::numeric>(exponent).to_double();
             bits[i] = bits_of_terms(base);
-            inside += bits[i] * GiNaC::ex_to<GiNaC::numeric>(exponent).to_double();
+            inside += bits[i].second * n;
+            most = std::fmax(most, bits[i].first * std::fabs(n));
         }
     }
-    if (std::fabs(front) <= large || inside == 0) return {};
-    const double part = std::clamp(-front / inside, 0.0, 1.0);
+    if (std::fabs(front) <= large && most <= large) return {};
+    const double part = inside == 0 || std::fabs(front) <= large ? 0 : std::clamp(-front / inside, 0.0, 1.0);
     std::vector<int> scales;
-    for (const double one : bits) scales.push_back(-static_cast<int>(std::lround(part * one)));
+    for (const auto& [least, largest] : bits)
+        scales.push_back(-static_cast<int>(std::lround(std::fmax(least, part * largest))));
     return scales;
 }
 

@@ -78,9 +78,8 @@ private:
         const std::string& name = x.coordinate.written;
         const std::vector<Id> ids = start_.convert({formula - given, formula});
         const Sized off = start_.evaluate_sized(ids).front();
-        const cln::cl_R rounding = off.size * cln::expt(cln::cl_RA(10), -14),
-                        denormal = cln::expt(cln::cl_RA(10), -300);
-        if (cln::abs(off.value) <= cln::max(rounding, denormal)) return;
+        const cln::cl_R rounding = off.size * cln::expt(cln::cl_RA(10), -14), least = cln::expt(cln::cl_RA(10), -300);
+        if (cln::abs(off.value) <= cln::max(rounding, least)) return;
         scene_.source.fail(
             x.constraint.at,
             fmt::format("the start does not keep the constraint {} ({}): the {} of {} is {}, but the other coordinates "

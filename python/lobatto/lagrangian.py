@@ -57,7 +57,7 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
     if not isinstance(lagrangian, str):
         raise InputError(f"the Lagrangian is a text, such as \"m*q'^2/2 - k*q^2/2\", not {lagrangian!r}")
     for name, table in ("method", method), ("output", output):
-        if table is not None and not isinstance(table, dict):
+        if table is not None and not hasattr(table, "items"):
             raise InputError(f"{name} is a table, such as {name}=dict({'points=4' if name == 'method' else 'every=10'}), "
                              f"not {table!r}")
     moving = set(re.findall(r"([A-Za-z_]\w*)'", re.sub("#[^\n]*", "", lagrangian)))  # without comments

@@ -249,6 +249,12 @@ TEST_CASE("a motion too fast for the states that a page has room for is told, wi
         "10 }\n[run]\nstep = 0.02\nuntil = 10\n");
     CHECK(warning(folder / "rotor.toml", "1e4").find("the page has room for") != std::string::npos);
     CHECK(warning(folder / "rotor.toml", "600").empty());
+    // A coordinate that rests beside one that moves slowly enough.
+    test::write_text(folder / "rests.toml",
+                     "lagrangian = \"(x'^2 + y'^2)/2 - x^2/2 - (y - 0.1)^2/2\"\n[coordinates]\n"
+                     "x = { position = 1, velocity = 0 }\ny = { position = 0.1, velocity = 0 }\n[run]\nstep = 0.1\n"
+                     "until = 10000\n");
+    CHECK(warning(folder / "rests.toml", "10000").empty());
 }
 
 TEST_CASE("curves of formulas of pieces are on the side where the motion is") {

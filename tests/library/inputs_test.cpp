@@ -280,6 +280,22 @@ TEST_CASE("an event that an input jumps over is none, and one that begins where 
     CHECK(times[1] == doctest::Approx(1.35));
 }
 
+TEST_CASE("inputs that are refused lose no event") {
+    for (const bool refuses : {false, true}) {
+        lob::Stepper stepper(lob::compile(lob::Scene::from_text(
+            "lagrangian = \"x'^2/2 + 0*f*x\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n[inputs]\nf = 0.5\n"
+            "w = 10\n[impacts]\nwall = { when = \"x = w rising\" }\n[output]\nevents = [\"x = f\"]\n[run]\n"
+            "step = 0.25\nuntil = 2\n")));
+        stepper.advance(2);  // x = f is zero there, and told by the next step
+        const double behind[] = {0.75, 0.1};
+        if (refuses) CHECK_THROWS_AS(stepper.set_inputs(behind), lob::Error);
+        stepper.advance(2);
+        const std::vector<lob::EventHit> hits = stepper.take_events();
+        REQUIRE(hits.size() == 1);
+        CHECK(hits[0].t == doctest::Approx(0.5));
+    }
+}
+
 TEST_CASE("an emitted kernel goes on as it was after inputs that it refuses, and a step that it does not take" *
           doctest::test_suite("slow")) {
     const lobatto::test::TemporaryFolder folder;

@@ -31,9 +31,9 @@ public:
         const std::size_t n = scene.coordinates.size();
         for (std::size_t k = 0; k < n; ++k) {
             const double q = size_of(scene.initial_position[k]),
-                         v = scene.start == Start::velocity ? size_of(scene.initial_rate[k]) : 0;
-            sizes_[parameters_ + k] = q > 0 ? q : v > 0 ? v : 1;
-            sizes_[parameters_ + n + k] = v > 0 ? v : sizes_[parameters_ + k];
+                         v = scene.start == Start::velocity ? size_of(scene.initial_rate[k]) : 0,
+                         size = std::fmax(q, v);
+            sizes_[parameters_ + k] = sizes_[parameters_ + n + k] = size > 0 ? size : 1;
         }
     }
 
@@ -69,9 +69,7 @@ private:
         }
         return std::nullopt;
     }
-    double size_of(const GiNaC::ex& start) const {
-        return std::fabs(scene_.evaluate(start, "the start").to_double());
-    }
+    double size_of(const GiNaC::ex& start) const { return std::fabs(scene_.evaluate(start, "the start").to_double()); }
     double random() { return 2 * static_cast<double>(generator_() >> 11) * 0x1p-53 - 1; }
 
     const Scene& scene_;

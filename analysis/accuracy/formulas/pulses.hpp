@@ -21,9 +21,9 @@ void insert_in_order(std::vector<Pulse>& pulses, const Pulse& one);
 bool is_too_long(const std::vector<Pulse>& pulses, double grading, double from, double step);
 
 // Those between two times that are narrower than `widest`, with the parameters at these values (scene order): of
-// exp(u) where u(t) is largest, of u^k with k of 4 and more where |u| is, of u^-k near complex roots of u, of tanh, atan, sinh, cosh and exp of a linear u where
-// u passes zero, of a table of a linear u where it bends most, of if and its kin where u passes zero twice; u holds the
-// time and parameters alone. In the order of time, at most 1000.
+// exp(u) where u(t) is largest, of u^4 and higher powers where |u| is largest, of u^-k near complex roots of u, of
+// tanh, atan, sinh, cosh and exp of a linear u where u passes zero, of a table of a linear u where it bends most, of if
+// and its kin where u passes zero twice; u holds the time and parameters alone. In the order of time, at most 1000.
 std::vector<Pulse> find_pulses(const Outline& outline, const std::vector<double>& parameters, double begin, double end,
                                double widest);
 

@@ -9,9 +9,9 @@
  *
  * Handles are opaque. A function that makes one never returns NULL unless memory is out: what went wrong is its status,
  * and in words its message. A handle that failed may be asked for these two and be freed; what is asked of it else is
- * 0 or NULL. NULL in place of a handle is answered in the same way, with status 4. Handles may be freed in any order.
- * Strings and arrays belong to their handle, until it changes or is freed. One handle must not be used by two threads
- * at a time. No exception leaves these functions.
+ * 0, NaN or NULL. NULL in place of a handle is answered in the same way: its own status is 4, and what is made of it
+ * has status 2. Handles may be freed in any order. Strings and arrays belong to their handle, until it changes or is
+ * freed. One handle must not be used by two threads at a time. No exception leaves these functions.
  *
  * Status: 0 all is well; 1 a stop of the scene ended the motion; 2 wrong input; 3 the computation failed; 4 the
  * compiler or the machine failed. 2 to 4 are the exit codes of the command line.

@@ -237,18 +237,13 @@ struct Sides {
 // state. Refused values change nothing.
 template <class K>
 Status set_watched_inputs(WatchedStepper<K>& stepper, typename K::Parameters values) {
-    const auto put = [&](typename K::Parameters given) {
-        for (int i = K::first_input; i < K::first_input + K::inputs; ++i)
-            K::parameter(stepper.parameters, i) = K::parameter(given, i);
-        const Status status = set_inputs(stepper, stepper.parameters);
-        if constexpr (WatchedStepper<K>::walls > 0)
-            return status == Status::ok ? Sides<K>::take_again(stepper) : status;
-        else
-            return status;
-    };
-    const typename K::Parameters before = stepper.parameters;
-    const Status status = put(values);
-    if (status != Status::ok) put(before);
+    const WatchedStepper<K> before = stepper;
+    for (int i = K::first_input; i < K::first_input + K::inputs; ++i)
+        K::parameter(stepper.parameters, i) = K::parameter(values, i);
+    Status status = set_inputs(stepper, stepper.parameters);
+    if constexpr (WatchedStepper<K>::walls > 0)
+        if (status == Status::ok) status = Sides<K>::take_again(stepper);
+    if (status != Status::ok) stepper = before;
     return status;
 }
 

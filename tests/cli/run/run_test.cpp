@@ -602,7 +602,7 @@ TEST_CASE("a name that leaves no room for the files beside it is refused before 
     const Place place;
     const test::Finished done = place.run({pendulum, "-o", place.file(std::string(240, 'a') + ".csv"), "--until", "1"});
     CHECK(done.exit_code == 2);
-    CHECK(test::contains(done.err, "the name of the file is 244 bytes long; choose one of at most 230"));
+    CHECK(test::contains(done.err, "the name of this file has 244 bytes, and at most 230 are possible"));
     CHECK(place.run({pendulum, "-o", place.file(std::string(226, 'a') + ".csv"), "--until", "1"}).exit_code == 0);
 }
 
