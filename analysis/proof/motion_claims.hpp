@@ -16,7 +16,8 @@ ProofRow order_row(const Convergence& convergence, const Kernel& kernel, const Q
 void prove_momenta(std::vector<ProofRow>& rows, const Kernel& kernel, const StartWithStep<double>& start,
                    const Scene& scene);
 
-// `unkept_by`: what lets the motion lose its energy; "" where it keeps it.
+// `unkept_by`: what lets the motion lose its energy; "" where it keeps it. `has_knots`: of measured values, across
+// which the forces have too few derivatives for a bounded energy error.
 void prove_energies(std::vector<ProofRow>& rows, const Kernel& kernel, const Kernel& exact_kernel,
                     const StartWithStep<double>& start, const States& states, const std::string& unkept_by,
                     bool has_knots);

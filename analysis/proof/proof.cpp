@@ -42,13 +42,6 @@ Derivation without_walls(Derivation derivation) {
     return derivation;
 }
 
-// Steps that cross the knots of a table in a constraint change the energy a little each time.
-bool has_tables_in_constraints(const Scene& scene) {
-    return std::any_of(scene.constraints.begin(), scene.constraints.end(), [](const Constraint& constraint) {
-        return std::any_of(constraint.value.preorder_begin(), constraint.value.preorder_end(), is_table_value);
-    });
-}
-
 }  // namespace
 
 Proof prove(const Scene& written, const MethodChoice& method,
@@ -115,7 +108,7 @@ Proof prove(const Scene& written, const MethodChoice& method,
     say("checking momenta and energy over long runs", 0.97);
     prove_momenta(rows, kernel, start, scene);
     const std::string unkept_by = forced ? "forces" : changes_with_time(scene, derivation.system) ? "time" : "";
-    prove_energies(rows, kernel, exact_kernel, start, states, unkept_by, has_tables_in_constraints(scene));
+    prove_energies(rows, kernel, exact_kernel, start, states, unkept_by, !scene.tables.empty());
 
     if (numbers != Precision::double_ && numbers != Precision::quadruple) {
         say("compiling and checking numbers in " + precision_name(numbers), 0.98);

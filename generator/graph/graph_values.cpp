@@ -200,9 +200,10 @@ std::pair<GiNaC::ex, GiNaC::ex> base_and_exponent(const GiNaC::ex& factor) {
 
 // GiNaC takes numbers in and out of sums in an order that differs from process to process, so that -2 may be -2.000...
 cln::cl_R exact_where_it_is(const cln::cl_R& x) {
-    if (cln:: instanceof (x, cln::cl_RA_ring)) return x;
+    if (is_rational(x)) return x;
+    constexpr long largest = 1000000;  // of such a fraction: all large numbers of many digits are whole
     const cln::cl_RA near = cln::rationalize(x);
-    return cln::denominator(near) < 1000000 ? near : x;
+    return cln::denominator(near) < largest && cln::abs(cln::numerator(near)) < largest ? near : x;
 }
 
 // About log2 |x|.
