@@ -104,8 +104,7 @@ void keep_foreign(const std::string& path, const std::string& given_mark) {
     if (bytes > longest_name)
         throw InputError(
             fmt::format("{}: the name of this file has {} bytes, and at most {} are possible, for others are named "
-                        "after it; choose a "
-                        "shorter name with -o",
+                        "after it; choose a shorter name with -o",
                         path, bytes, longest_name));
     if (!std::filesystem::is_regular_file(path, none)) return;
     const std::string begin = begin_of(path), mark = given_mark.empty() ? mark_of(path) : given_mark;
