@@ -48,13 +48,22 @@ StartIn<real> start_in(const ExactStart& start, const Kernel& kernel, real step)
         return converted;
     };
     StartIn<real> result{all(start.parameters), all(start.q), all(start.rate)};
+    if (static_cast<std::size_t>(kernel->coordinates) == result.q.size() + 1) {  // of a clock that knows the time (D64)
+        result.q.push_back(real(0));
+        result.p.push_back(start.from_velocity ? real(1) : real(0));
+    }
     LoadedStepper<real> stepper(kernel);
     const lobatto_status status = stepper.prepare(result.parameters, step);
     if (status != LOBATTO_OK)
         throw ComputationError(status == LOBATTO_SINGULAR_MASS
                                    ? "the mass matrix has no inverse for the scene's parameters"
                                    : "the kernel's coefficients are not finite for the scene's parameters and step");
-    if (start.from_velocity) result.p = momentum_of_start(stepper, real(0), result.q, result.p);
+    if (start.from_velocity) {
+        result.p = momentum_of_start(stepper, real(0), result.q, result.p);
+    } else if (kernel->clocked != 0 && stepper.start(real(0), result.q, result.p) == LOBATTO_OK) {
+        real time;  // the kernel knows the momentum of the time
+        stepper.state(time, result.q, result.p);
+    }
     return result;
 }
 

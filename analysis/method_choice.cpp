@@ -40,10 +40,10 @@ void check_choice(const MethodChoice& choice) {
 Scene with_clock(const std::string& word, Scene scene) {
     if (word == "none") return with_equal_steps(std::move(scene));
     const bool has_own = scene.clock && scene.clock->is_automatic;
-    if (!has_own && (!scene.inputs().empty() || !has_automatic_clock(scene)))
+    if (!has_own && !has_automatic_clock(scene))
         throw InputError(scene.path +
-                         ": there is no clock \"auto\": it needs a motion that keeps its energy, without constraints, "
-                         "impacts and inputs, and a term of the Lagrangian that grows without bound, such as 1/r");
+                         ": there is no clock \"auto\": it needs a motion without constraints, impacts and inputs, and "
+                         "a term of the Lagrangian that grows without bound, such as 1/r");
     return with_automatic_clock(std::move(scene));
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "analysis/exact_start.hpp"
+#include "generator/scene/time_coordinate.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/other_velocity.hpp"
 #include "runtime/run/parts.hpp"
@@ -27,7 +28,12 @@ Arrivals arrivals_of(const Scene& scene, std::int64_t count) {
     arrivals.end = scene.evaluate(scene.run.until, "the end time").to_double();
     arrivals.interval = scene.evaluate(scene.outputs.interval, "the time between states").to_double();
     arrivals.keeps_chain = arrivals.interval == 0;
-    if (arrivals.keeps_chain) arrivals.interval = arrivals.end / static_cast<double>(count);
+    if (arrivals.keeps_chain) {
+        arrivals.interval = arrivals.end / static_cast<double>(count);
+        // The last arrival is the end itself: a rounding beyond it is cut off, one before it would stay.
+        if (arrivals.interval * static_cast<double>(count) < arrivals.end)
+            arrivals.interval = std::nextafter(arrivals.interval, arrivals.end);
+    }
     return arrivals;
 }
 
@@ -122,6 +128,8 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
         if (start.from_velocity)
             request.p = momentum_of_start(stepper, request.time, request.q, request.p, scene.path + ": ");
         none.status = stepper.start(request.time, request.q, request.p);
+        if (none.status == LOBATTO_OK && has_time_coordinate(scene))  // the kernel knows its momentum
+            stepper.state(request.time, request.q, request.p);
     }
     none.q = request.q;
     none.p = request.p;

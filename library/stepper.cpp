@@ -162,6 +162,7 @@ struct Stepper::Parts {
         lobatto_status status = stepper.prepare(parameters, step);
         if (status == LOBATTO_OK) status = stepper.start(time, q, p);
         if (status != LOBATTO_OK) fail(status, {});
+        if (is_clocked()) stepper.state(time, q, p);  // where the time is a coordinate, the kernel sets it
         origin = time;
         stop_ahead.reset();
         std::erase_if(found, [&](const EventHit& hit) { return time < hit.t; });

@@ -86,6 +86,7 @@ constexpr const char* compiled_quickly[] = {
     "/analysis/taken_steps_test.cpp",
     "/analysis/tradeoff_kinds_test.cpp",
     "/analysis/tradeoff_test.cpp",
+    "/analysis/time_coordinate_test.cpp",
     "/analysis/verdicts_test.cpp",
     "/cli/new_test.cpp",
     "/cli/run/columns_test.cpp",

@@ -9,6 +9,7 @@
 #include "analysis/accuracy/companion/companion.hpp"
 #include "analysis/accuracy/formulas/constraint_sizes.hpp"
 #include "analysis/stability/limit.hpp"
+#include "generator/scene/time_coordinate.hpp"
 #include "runtime/build/compiler.hpp"
 #include "runtime/build/sha256.hpp"
 #include "runtime/error.hpp"
@@ -76,9 +77,9 @@ double end_of(const Scene& scene) {
 
 Experiment::Experiment(const Scene& written, const Scene& scene, ExperimentRequest request)
     : began_(std::chrono::steady_clock::now()),
-      scene_(scene),
+      scene_(without_time_coordinate(scene)),
       request_(std::move(request)),
-      start_(scene),
+      start_(scene_),
       kernels_(written, scene, request_.tries_clocks),
       conserves_(kernels_.derivation().conserves_energy()) {
     Member reference = reference_member(scene, request_.wanted);
@@ -142,9 +143,10 @@ Experiment::Experiment(const Scene& written, const Scene& scene, ExperimentReque
     for (const StepClock clock : kernels_.clocks()) find_span(clock);
 }
 
-double Experiment::rate_at(StepClock clock, const std::vector<GiNaC::ex>& positions) const {
+double Experiment::rate_at(StepClock clock, const std::vector<GiNaC::ex>& positions, double time) const {
     const Scene& clocked = kernels_.derivation(clock).scene;
     GiNaC::exmap values;
+    if (has_time_coordinate(clocked)) values[clocked.coordinates.back().position] = time;
     for (std::size_t k = 0; k < positions.size(); ++k) values[clocked.coordinates[k].position] = positions[k];
     return scene_.evaluate(clocked.clock->rate.subs(values), "the clock").to_double();
 }
@@ -158,7 +160,7 @@ bool Experiment::varies(StepClock clock) const {
         const auto row = static_cast<std::size_t>(reference_.samples * look / rate_looks) * 2 * n;
         std::vector<GiNaC::ex> positions;
         for (std::size_t k = 0; k < n; ++k) positions.emplace_back(reference_.high[row + k]);
-        const double rate = rate_at(clock, positions);
+        const double rate = rate_at(clock, positions, reference_.until * look / rate_looks);
         least = std::fmin(least, rate);
         most = std::fmax(most, rate);
     }
@@ -169,7 +171,7 @@ bool Experiment::varies(StepClock clock) const {
 void Experiment::find_span(StepClock clock) {
     request_.say("a first run with a clock");
     const Kernel kernel = kernels_.kernel(pilot_member(clock));
-    const double rate = rate_at(clock, scene_.initial_position);
+    const double rate = rate_at(clock, scene_.initial_position, 0);
     const double frequency = std::fmax(reference_.frequency_at_start, 1 / until());
     double h = pilot_radians / (frequency * rate);
     for (int pilot = 0; pilot < pilots; ++pilot, h /= 4) {

@@ -75,7 +75,7 @@ public:
     Measurement time_again(const Measurement& measurement, int repetitions);
 
 private:
-    double rate_at(StepClock clock, const std::vector<GiNaC::ex>& positions) const;
+    double rate_at(StepClock clock, const std::vector<GiNaC::ex>& positions, double time) const;
     bool varies(StepClock clock) const;
     void find_span(StepClock clock);
 

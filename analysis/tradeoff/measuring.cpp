@@ -33,6 +33,7 @@ struct TimedRun {
     StartIn<real> start;
     double until;
     real h;
+    std::size_t n;           // coordinates of the scene; a kernel with a clock may have the time beside them
     std::vector<real> rows;  // meetings x (1 + 2n)
     std::int64_t meetings, every;
     double seconds = 0, took = 0;  // of processor time, all calls and the last
@@ -44,10 +45,10 @@ struct TimedRun {
         : stepper(kernel),
           until(end),
           h(step_of(candidate, measurer.span(candidate.member.clock))),
+          n(exact.q.size()),
           meetings(std::gcd(candidate.steps, std::int64_t(samples))),
           every(candidate.steps / meetings) {
         start = start_in<real>(exact, kernel, h);
-        rows.resize(static_cast<std::size_t>(meetings) * columns());
     }
 
     // With a clock a double, as scenes are given it.
@@ -56,7 +57,8 @@ struct TimedRun {
             return static_cast<real>(span / static_cast<double>(candidate.steps));
         return static_cast<real>(span) / static_cast<real>(candidate.steps);
     }
-    std::size_t columns() const { return 1 + 2 * start.q.size(); }
+    std::size_t columns() const { return 1 + 2 * n; }
+    std::size_t columns_of_kernel() const { return 1 + 2 * start.q.size(); }
 
     bool begin() {
         seconds = 0;
@@ -87,6 +89,7 @@ struct TimedRun {
         const bool is_clocked = candidate.member.clock != StepClock::none;
         const std::int64_t all = is_clocked ? meetings : candidate.steps;
         std::int64_t done = 0, written = 0, block = std::min<std::int64_t>(all, 4096);
+        rows.resize(static_cast<std::size_t>(meetings) * columns_of_kernel());
         for (begin(); status == LOBATTO_OK && done < all && seconds < limit;) {
             lobatto_advance call{};
             call.steps = std::min(block, all - done);
@@ -94,7 +97,7 @@ struct TimedRun {
             call.record_every = is_clocked ? 1 : every;
             call.interval = until / static_cast<double>(meetings);
             call.end = until;
-            call.records = rows.data() + static_cast<std::size_t>(written) * columns();
+            call.records = rows.data() + static_cast<std::size_t>(written) * columns_of_kernel();
             call.capacity = meetings - written + 1;
             advance(call, interrupted);
             done += call.steps_done;
@@ -103,6 +106,7 @@ struct TimedRun {
             if (is_clocked) give_up_endless_chain(candidate);
         }
         if (written < meetings && status == LOBATTO_OK) status = LOBATTO_NOT_FINITE;
+        keep_columns();
     }
 
     // Every step of a chain, and the end.
@@ -112,7 +116,7 @@ struct TimedRun {
         bool has_arrived = false;
         for (begin(); status == LOBATTO_OK && !has_arrived;) {
             const std::size_t size = rows.size();
-            rows.resize(size + room * columns());
+            rows.resize(size + room * columns_of_kernel());
             lobatto_advance call{};
             call.steps = call.record_every = call.chain_records = 1;
             call.tolerance = candidate.tolerance;
@@ -122,8 +126,9 @@ struct TimedRun {
             advance(call, interrupted);
             give_up_endless_chain(candidate);
             has_arrived = call.steps_done == 1;
-            rows.resize(size + static_cast<std::size_t>(call.records_written) * columns());
+            rows.resize(size + static_cast<std::size_t>(call.records_written) * columns_of_kernel());
         }
+        keep_columns();
         meetings = static_cast<std::int64_t>(rows.size() / columns());
     }
 
@@ -133,17 +138,28 @@ struct TimedRun {
     }
     template <class Wide>
     std::vector<Wide> positions(std::int64_t meeting) const {
-        return meeting == 0 ? std::vector<Wide>(start.q.begin(), start.q.end()) : part<Wide>(meeting, 0);
+        return meeting == 0 ? std::vector<Wide>(start.q.data(), start.q.data() + n) : part<Wide>(meeting, 0);
     }
     template <class Wide>
     std::vector<Wide> momenta(std::int64_t meeting) const {
-        return meeting == 0 ? std::vector<Wide>(start.p.begin(), start.p.end()) : part<Wide>(meeting, 1);
+        return meeting == 0 ? std::vector<Wide>(start.p.data(), start.p.data() + n) : part<Wide>(meeting, 1);
     }
 
 private:
+    // Of rows of the kernel those of the scene.
+    void keep_columns() {
+        const std::size_t width = columns_of_kernel(), extra = start.q.size() - n;
+        if (extra == 0) return;
+        auto to = rows.begin();
+        for (auto row = rows.begin(); row != rows.end(); row += static_cast<std::ptrdiff_t>(width)) {
+            to = std::copy_n(row, 1 + n, to);
+            to = std::copy_n(row + static_cast<std::ptrdiff_t>(1 + n + extra), n, to);
+        }
+        rows.erase(to, rows.end());
+    }
+
     template <class Wide>
     std::vector<Wide> part(std::int64_t meeting, std::size_t number) const {
-        const std::size_t n = start.q.size();
         const real* const first = rows.data() + static_cast<std::size_t>(meeting - 1) * columns() + 1 + number * n;
         return std::vector<Wide>(first, first + n);
     }
@@ -324,7 +340,6 @@ double Measurer::error_on_steps_in(const Kernel& kernel, const Candidate& candid
     } else {
         run.every = std::max<std::int64_t>(1, candidate.steps / looks);
         run.meetings = candidate.steps / run.every;
-        run.rows.resize(static_cast<std::size_t>(run.meetings) * run.columns());
         run.go(candidate, interrupted_, infinity);
     }
     if (run.status != LOBATTO_OK) return infinity;

@@ -5,6 +5,7 @@
 #include "generator/mechanics/structure/scaled_mass.hpp"
 #include "generator/programs/builder.hpp"
 #include "generator/programs/identifier.hpp"
+#include "generator/scene/time_coordinate.hpp"
 
 namespace lobatto {
 
@@ -231,11 +232,12 @@ private:
     Id energy() {
         const std::vector<ex> terms =
             d_.scene.clock ? terms_of(d_.scene.clock->lagrangian, motion_symbols()) : d_.system.terms;
+        const std::size_t moving = n_ - (has_time_coordinate(d_.scene) ? 1 : 0);
         std::vector<ex> radial;  // v . d(term)/dv
         for (const ex& term : terms) {
             const std::vector<ex> slopes = gradient_of({term}, d_.system.v);
             ex sum = 0;
-            for (std::size_t k = 0; k < n_; ++k)
+            for (std::size_t k = 0; k < moving; ++k)
                 if (!slopes[k].is_zero()) sum += d_.system.v[k] * slopes[k];
             radial.push_back(sum);
         }

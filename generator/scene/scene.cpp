@@ -19,6 +19,7 @@
 #include "generator/scene/file/document.hpp"
 #include "generator/scene/file/table.hpp"
 #include "generator/scene/system_reader.hpp"
+#include "generator/scene/time_coordinate.hpp"
 
 namespace lobatto {
 namespace {
@@ -66,6 +67,7 @@ public:
         refuse_beside_impacts();
         for (const auto& [file, use] : system_.tables()) scene_.tables.push_back(use);
         system_.refuse_unused();
+        add_time_coordinate(scene_);
         return std::move(scene_);
     }
 
@@ -175,8 +177,8 @@ private:
             return;
         }
         const Operand rate = evaluate(source_, parse_formula(source_, formula_of(source_, entry), scope), scope);
-        if (rate.velocities || rate.expression.has(scene_.time))
-            fail(at, "a clock is a formula of positions and parameters, such as \"sqrt(x^2 + y^2)\"");
+        if (rate.velocities)
+            fail(at, "a clock is a formula of positions, parameters and the time, such as \"sqrt(x^2 + y^2)\"");
         const bool moves = std::any_of(scene_.coordinates.begin(), scene_.coordinates.end(),
                                        [&](const Coordinate& one) { return rate.expression.has(one.position); });
         if (!rate.moves || !moves)

@@ -98,12 +98,13 @@ struct Outputs {
 // A clock: steps are equally long in a time tau with dt = g(q) dtau (generator/mechanics/clock/clock.hpp).
 struct Clock {
     std::string text;                         // as written, white space collapsed: "r^(3/2)"
-    GiNaC::ex rate;                           // g, in positions and parameters
+    GiNaC::ex rate;                           // g, in positions, time and parameters
     std::optional<Position> at;               // in the scene file; nothing: an option asked for it
-    GiNaC::symbol energy{"energy_of_start"};  // E
-    bool is_automatic = false;  // "auto": g follows from L (generator/mechanics/clock/automatic_clock.hpp)
-    bool is_applied = false;    // the scene is one in tau
-    GiNaC::ex lagrangian;       // then: L(q, w / g), with w = dq/dtau
+    GiNaC::symbol energy{"energy_of_start"};  // E; where the time is a coordinate the scale sigma of (D64)
+    bool is_automatic = false;         // "auto": g follows from L (generator/mechanics/clock/automatic_clock.hpp)
+    bool has_time_coordinate = false;  // the last one (generator/scene/time_coordinate.hpp)
+    bool is_applied = false;           // the scene is one in tau
+    GiNaC::ex lagrangian;              // then: L(q, dq/dt) in velocities w = dq/dtau
 };
 
 // A holonomic constraint: phi(q, t) = 0 at all times.

@@ -41,6 +41,7 @@
 #include "iteration/stage_equations.hpp"
 #include "iteration/stage_map.hpp"
 #include "iteration/tangent.hpp"
+#include "iteration/time_coordinate.hpp"
 #include "iteration/velocity_of_momentum.hpp"
 #include "steppers/clean.hpp"
 #include "steppers/clocked.hpp"

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "generator/mechanics/system/system.hpp"
+#include "generator/scene/time_coordinate.hpp"
 
 namespace lobatto {
 
@@ -96,7 +97,7 @@ Poles poles_of(const Scene& scene) {
 }  // namespace
 
 ex automatic_clock(const Scene& scene) {
-    GiNaC::exmap start;
+    GiNaC::exmap start{{scene.time, 0}};
     for (std::size_t k = 0; k < scene.coordinates.size(); ++k)
         start[scene.coordinates[k].position] = scene.initial_position[k];
     const Poles poles = poles_of(scene);
@@ -110,10 +111,7 @@ ex automatic_clock(const Scene& scene) {
 }
 
 bool has_automatic_clock(const Scene& scene) {
-    const bool conserves = !scene.lagrangian.has(scene.time) && scene.constraints.empty() && !scene.is_cut() &&
-                           std::all_of(scene.coordinates.begin(), scene.coordinates.end(),
-                                       [](const Coordinate& c) { return c.force.is_zero(); });
-    return conserves && poles_of(scene).least.has_value();
+    return scene.constraints.empty() && !scene.is_cut() && scene.inputs().empty() && poles_of(scene).least.has_value();
 }
 
 namespace {
@@ -129,14 +127,17 @@ void keep_all_steps(Outputs& outputs) {
 Scene with_automatic_clock(Scene scene) {
     if (scene.clock && scene.clock->is_automatic) return scene;
     if (!scene.clock) keep_all_steps(scene.outputs);
+    scene = without_time_coordinate(std::move(scene));
     scene.clock = Clock();
     scene.clock->text = "auto";
     scene.clock->is_automatic = true;
+    add_time_coordinate(scene);
     return scene;
 }
 
 Scene with_equal_steps(Scene scene) {
     if (!scene.clock) return scene;
+    scene = without_time_coordinate(std::move(scene));
     scene.clock.reset();
     keep_all_steps(scene.outputs);
     return scene;

@@ -11,7 +11,7 @@ namespace lobatto {
 // start. InputError where no term has a pole.
 GiNaC::ex automatic_clock(const Scene& scene);
 
-// Whether there is one, of a motion that keeps its energy.
+// Whether there is one, of a motion without constraints, cuts and inputs.
 bool has_automatic_clock(const Scene& scene);
 
 // The scene with that clock, or with equal steps in t. Where that changes what a step is, all states at its steps are

@@ -10,7 +10,9 @@
 #include <stdexcept>
 
 #include "generator/mechanics/clock/automatic_clock.hpp"
+#include "generator/mechanics/start.hpp"
 #include "generator/mechanics/system/system.hpp"
+#include "generator/scene/time_coordinate.hpp"
 
 namespace lobatto {
 
@@ -22,18 +24,11 @@ using Symbols = std::vector<GiNaC::symbol>;
 // Terms longer than this are not expanded to find their degree.
 constexpr std::size_t longest_term = 2000;
 
-void require_conservation(const Scene& scene) {
-    for (const Coordinate& coordinate : scene.coordinates)
-        if (!coordinate.force.is_zero())
-            fail_at_clock(
-                scene, fmt::format("a clock needs a motion that keeps its energy, but a force acts on {}; remove the "
-                                   "clock, or the force",
-                                   coordinate.written));
-    if (scene.lagrangian.has(scene.time))
-        fail_at_clock(
-            scene,
-            "a clock needs a motion that keeps its energy, but the Lagrangian depends on the time; remove the "
-            "clock, or the time from the Lagrangian");
+// The power of a positive g; of one that is a power itself, such as r^(3/2), one power and not two.
+ex power_of(const ex& g, const ex& exponent) {
+    const bool is_power = GiNaC::is_a<GiNaC::power>(g) && g.op(1).info(GiNaC::info_flags::rational) &&
+                          !g.op(1).info(GiNaC::info_flags::integer);
+    return is_power ? GiNaC::pow(g.op(0), g.op(1) * exponent) : GiNaC::pow(g, exponent);
 }
 
 // What is computed from values at the start; InputError where one is not finite and real.
@@ -52,14 +47,23 @@ auto with_value_at_start(const Scene& scene, const Work& work) {
 class Transformation {
 public:
     explicit Transformation(const Scene& scene) : scene_(scene), g_(clock_rate(scene)) {
+        const Coordinate& last = scene.coordinates.back();
+        if (has_time_coordinate(scene)) {
+            moment_ = {{scene.time, last.position}};
+            g_ = g_.subs(moment_);
+        }
+        pace_ = has_time_coordinate(scene) ? ex(last.velocity) : g_;
+        slower_ = moment_;
         for (const Coordinate& coordinate : scene.coordinates) {
+            if (has_time_coordinate(scene) && &coordinate == &last) continue;
             q_.push_back(coordinate.position);
             v_.push_back(coordinate.velocity);
-            slower_[coordinate.velocity] = coordinate.velocity / g_;
+            slower_[coordinate.velocity] = coordinate.velocity / pace_;
         }
         motion_ = q_;
         motion_.insert(motion_.end(), v_.begin(), v_.end());
         motion_.push_back(scene.time);
+        set_rates();
     }
 
     Scene transform() {
@@ -68,34 +72,57 @@ public:
         Clock& clock = *result.clock;
         clock.is_applied = true;
         clock.rate = g_;
-        // Terms of one degree stay together: their sum is differentiated as one factor, beside the power of g.
-        std::map<int, ex> of_degree{{0, clock.energy}};
+        // Terms of one degree stay together: their sum is differentiated as one factor, beside the power of the pace.
+        std::map<int, ex> of_degree;
         ex action = 0;
         clock.lagrangian = 0;
         for (const ex& term : terms_of(scene_.lagrangian, motion_)) {
             const std::optional<int> degree = degree_of(term);
-            const ex slow = degree ? term * GiNaC::pow(g_, -*degree) : in_clock_time(term);
+            const ex slow = degree ? term.subs(moment_) * GiNaC::pow(pace_, -*degree) : in_clock_time(term);
             clock.lagrangian += slow;
             if (degree)
-                of_degree[*degree] += term;
+                of_degree[*degree] += term.subs(moment_);
             else
-                action += g_ * slow;
+                action += pace_ * slow;
         }
-        for (const auto& [degree, sum] : of_degree) action += sum * GiNaC::pow(g_, 1 - degree);
+        if (!has_time_coordinate(scene_)) of_degree[0] += clock.energy;
+        for (const auto& [degree, sum] : of_degree) action += sum * GiNaC::pow(pace_, 1 - degree);
+        if (has_time_coordinate(scene_)) {
+            action += kept_pace(clock.energy);
+            transform_forces(result);
+        }
         result.lagrangian = action;
         result.outputs.energy = true;  // kernels take E from it
         for (DomainCondition& condition : result.conditions)
             for (ex* formula : {&condition.expression, &condition.argument}) *formula = in_clock_time(*formula);
-        for (Eliminated& x : result.eliminated) x.velocity = in_clock_time(x.velocity);
+        for (Eliminated& x : result.eliminated) {
+            x.position = x.position.subs(moment_);
+            x.velocity = in_clock_time(x.velocity);
+        }
         const std::string name = clock.energy.get_name();
-        result.parameters.push_back(
-            {name, "", scene_.evaluate(energy_at_start(), "the energy at the start"), clock.energy, name});
-        if (scene_.start == Start::velocity)
-            for (std::size_t k = 0; k < q_.size(); ++k) result.initial_rate[k] = scene_.initial_rate[k] * at_start(g_);
+        result.parameters.push_back({name, "", number_of_start(), clock.energy, name});
+        if (has_time_coordinate(scene_)) result.start = Start::velocity;
+        if (result.start == Start::velocity)
+            for (std::size_t k = 0; k < rates_.size(); ++k) result.initial_rate[k] = rates_[k] * at_start(g_);
         return result;
     }
 
 private:
+    // A momentum is no velocity: at rest, for want of better; kernels know the energy when they start. Where the time
+    // is a coordinate, that of the start has to be known.
+    void set_rates() {
+        if (scene_.start == Start::velocity) {
+            rates_ = scene_.initial_rate;
+        } else if (has_time_coordinate(scene_)) {
+            Scene in_time = without_time_coordinate(scene_);
+            in_time.clock.reset();
+            for (const cln::cl_R& v : start_on_constraints(in_time, build_system(in_time)).v)
+                rates_.emplace_back(GiNaC::numeric(v));
+            rates_.emplace_back(1);
+        } else {
+            rates_.assign(scene_.coordinates.size(), 0);
+        }
+    }
     void require_positive_rate() const {
         const GiNaC::numeric rate = scene_.value_of(at_start(g_));
         if (!rate.is_positive())
@@ -106,20 +133,42 @@ private:
 
     ex in_clock_time(const ex& expression) const { return expression.subs(slower_, GiNaC::subs_options::no_pattern); }
     ex at_start(const ex& expression) const {
-        GiNaC::exmap values;
-        for (std::size_t k = 0; k < q_.size(); ++k) {
-            values[q_[k]] = scene_.initial_position[k];
-            // A momentum is no velocity: at rest, for want of better; kernels know the energy when they start.
-            values[v_[k]] = scene_.start == Start::velocity ? scene_.initial_rate[k] : ex(0);
+        GiNaC::exmap values{{scene_.time, 0}};
+        for (std::size_t k = 0; k < scene_.coordinates.size(); ++k) {
+            values[scene_.coordinates[k].position] = scene_.initial_position[k];
+            values[scene_.coordinates[k].velocity] = rates_[k];
         }
         return expression.subs(values, GiNaC::subs_options::no_pattern);
     }
-    // v . dL/dv - L
-    ex energy_at_start() const {
-        ex sum = -at_start(scene_.lagrangian);
+
+    // sigma g^a (w_t / g - 1)^2 / 2 of (D64), a power of the pace w_t at a time.
+    ex kept_pace(const ex& sigma) const {
+        const ex a = pace_exponent(g_);
+        return sigma / 2 *
+               (power_of(g_, a - 2) * GiNaC::pow(pace_, 2) - 2 * power_of(g_, a - 1) * pace_ + power_of(g_, a));
+    }
+    // F of the coordinates is w_t F in the time of the clock, and takes its power, F . w, from the momentum of the
+    // time.
+    void transform_forces(Scene& result) const {
+        ex power = 0;
+        for (std::size_t k = 0; k < v_.size(); ++k) {
+            const ex force = in_clock_time(scene_.coordinates[k].force);
+            result.coordinates[k].force = pace_ * force;
+            power += force * v_[k];
+        }
+        result.coordinates.back().force = -power;
+    }
+
+    // E = v . dL/dv - L, or the sigma that makes the last term of (D64) as large as the terms of L.
+    GiNaC::numeric number_of_start() const {
+        ex moving = 0;  // v . dL/dv
         const std::vector<ex> momentum = gradient_of(terms_of(scene_.lagrangian, motion_), v_);
-        for (std::size_t k = 0; k < v_.size(); ++k) sum += at_start(v_[k] * momentum[k]);
-        return sum;
+        for (std::size_t k = 0; k < v_.size(); ++k) moving += at_start(v_[k] * momentum[k]);
+        const auto value = [&](const ex& formula) { return scene_.evaluate(formula, "the energy at the start"); };
+        const ex energy = moving - at_start(scene_.lagrangian);
+        if (!has_time_coordinate(scene_)) return value(energy);
+        const GiNaC::numeric size = GiNaC::abs(value(moving / 2)) + GiNaC::abs(value(energy - moving / 2));
+        return size.is_zero() ? GiNaC::numeric(1) : size * value(at_start(power_of(g_, 1 - pace_exponent(g_))));
     }
 
     // Of a term that is homogeneous in the velocities: so that g need not be divided by and multiplied with again.
@@ -136,16 +185,23 @@ private:
     }
 
     const Scene& scene_;
-    const ex g_;
-    Symbols q_, v_, motion_;
-    GiNaC::exmap slower_;  // v -> w / g
+    ex g_, pace_;             // dt/dtau: g, or the velocity of the time
+    Symbols q_, v_, motion_;  // without the time's
+    std::vector<ex> rates_;   // dq/dt at the start
+    GiNaC::exmap moment_;     // t -> its coordinate, where it has one
+    GiNaC::exmap slower_;     // this, and v -> w / pace
 };
 
 }  // namespace
 
+GiNaC::numeric pace_exponent(const ex& g) {
+    const GiNaC::numeric third(1, 3);
+    const bool is_power = GiNaC::is_a<GiNaC::power>(g) && g.op(1).info(GiNaC::info_flags::rational);
+    return is_power && (4 * g.op(1) * third).info(GiNaC::info_flags::integer) ? third : GiNaC::numeric(0);
+}
+
 ex clock_rate(const Scene& scene) {
     if (scene.clock->is_applied) return scene.clock->rate;
-    require_conservation(scene);
     return with_value_at_start(scene,
                                [&] { return scene.clock->is_automatic ? automatic_clock(scene) : scene.clock->rate; });
 }

@@ -23,6 +23,7 @@
 #include "galerkin_tables.hpp"
 #include "hamilton.hpp"
 #include "node_mass.hpp"
+#include "time_coordinate.hpp"
 
 namespace lobatto {
 
@@ -343,7 +344,9 @@ private:
         }
         if constexpr (K::clocked) {
             V rate[parts];
-            for (int part = 0; part < parts; ++part) rate[part] = Formulas<K>::clock(k, V(time), a.Q + part * n);
+            for (int part = 0; part < parts; ++part)
+                rate[part] = HasTimeCoordinate<K>::value ? a.v[part * n + n - 1]
+                                                         : Formulas<K>::clock(k, V(time), a.Q + part * n);
             const T passed = over_nodes(weight, rate, 1);
             not_finite += passed - passed;
             elapsed = select(done, passed, elapsed);

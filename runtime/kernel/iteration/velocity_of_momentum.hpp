@@ -3,7 +3,8 @@
 // dphi/dq, it is the velocity that keeps them, with multipliers mu (D46):
 //     dL/dv + G^T mu = p,  G v + dphi/dt = 0.
 // p - G^T mu is then the nearest momentum, in the metric of the mass, whose velocity keeps the constraints. The same
-// matrix, of M and G, gives the multipliers of a motion (D49).
+// matrix, of M and G, gives the multipliers of a motion (D49). If the time is a coordinate, its velocity is that of the
+// clock, whatever its momentum, so that the other velocities are those of their own momenta.
 #ifndef LOBATTO_KERNEL_VELOCITY_OF_MOMENTUM_HPP
 #define LOBATTO_KERNEL_VELOCITY_OF_MOMENTUM_HPP
 
@@ -12,6 +13,7 @@
 #include "../base/contract.hpp"
 #include "../base/dense.hpp"
 #include "../base/numbers.hpp"
+#include "time_coordinate.hpp"
 
 namespace lobatto {
 
@@ -38,14 +40,16 @@ public:
                 real phi[constraints];
                 Formulas<K>::constraint(k, time, q, phi, a.phi_t, a.G);
             }
-            rest(a);
+            rest(at, a);
             Status status = solve(at, a);
             if (status != Status::ok) {
-                rest(a);
+                rest(at, a);
                 if (guess(a.x)) status = solve(at, a);
             }
-            if (status != Status::ok) {
-                begin_at_momentum(at, a);
+            for (int k = -1; k < most_directions && status != Status::ok; ++k) {
+                real direction[n] = {};
+                for (int i = 0; i < n; ++i) direction[i] = k < 0 ? p[i] : real(i == k / 2) * real(k % 2 == 0 ? 1 : -1);
+                begin_along(at, direction, a);
                 if (solve(at, a) == Status::ok) status = Status::ok;
             }
             for (int i = 0; i < n; ++i) v[i] = a.x[i];
@@ -76,6 +80,7 @@ public:
 private:
     using Layout = std::conditional_t<K::cyclic == 0, LayoutOf<K, unknowns, 1>, Single<n>>;
     static constexpr int few = 4;  // iterations, after which only rounding may be left
+    static constexpr int most_directions = n <= 16 ? 2 * n : 0;
     static constexpr int mass_room = K::mass_entries > 0 ? K::mass_entries : 1;
     static constexpr int slope_room = K::constraint_entries > 0 ? K::constraint_entries : 1;
     // x: v, then mu.
@@ -90,14 +95,16 @@ private:
         const real *q, *p;
     };
 
-    static void rest(Arrays& a) {
+    static void rest(const State& at, Arrays& a) {
         for (int i = 0; i < unknowns; ++i) a.x[i] = real(0);
+        if constexpr (HasTimeCoordinate<K>::value) a.x[n - 1] = Formulas<K>::clock(at.k, at.time, at.q);
     }
 
     // Both equations at x; whether they have values there.
     LOBATTO_APART static bool evaluate(const State& at, const real* x, Arrays& a) {
         Formulas<K>::legendre(at.k, at.time, at.q, x, a.p, a.mass);
         for (int i = 0; i < n; ++i) a.residual[i] = at.p[i] - a.p[i];
+        if constexpr (HasTimeCoordinate<K>::value) a.residual[n - 1] = real(0);
         for (int c = 0; c < constraints; ++c) a.residual[n + c] = -a.phi_t[c];
         each_slope([&](int e, int c, int i) {
             a.residual[i] -= a.G[e] * x[n + c];
@@ -115,7 +122,10 @@ private:
     // M and G.
     static void set_matrix(Arrays& a) {
         a.matrix.clear();
-        for (int e = 0; e < K::mass_entries; ++e) a.matrix(K::mass_row[e], 0, K::mass_column[e], 0) += a.mass[e];
+        for (int e = 0; e < K::mass_entries; ++e)
+            if (!HasTimeCoordinate<K>::value || K::mass_row[e] < n - 1)
+                a.matrix(K::mass_row[e], 0, K::mass_column[e], 0) += a.mass[e];
+        if constexpr (HasTimeCoordinate<K>::value) a.matrix(n - 1, 0, n - 1, 0) = real(1);
         each_slope([&](int e, int c, int i) {
             a.matrix(i, 0, n + c, 0) += a.G[e];
             a.matrix(n + c, 0, i, 0) += a.G[e];
@@ -151,18 +161,20 @@ private:
         return Status::not_converged;
     }
 
-    // At rest there is no inverse, as of v^4: the multiple of the momentum whose own momentum is nearest.
-    static void begin_at_momentum(const State& at, Arrays& a) {
+    // At rest there is no inverse, as of v^4, and no value of x'^2/t': the multiple of a direction whose own momentum
+    // is nearest. Directions are that of the momentum, and where it does not do those of the coordinates.
+    static void begin_along(const State& at, const real* direction, Arrays& a) {
+        constexpr int moving = HasTimeCoordinate<K>::value ? n - 1 : n;
         real best = real(0), nearest = -real(1);
-        rest(a);
+        rest(at, a);
         for (real scale = real(0x1p-40); scale <= real(0x1p40); scale *= real(2)) {
-            for (int i = 0; i < n; ++i) a.x[i] = scale * at.p[i];
+            for (int i = 0; i < moving; ++i) a.x[i] = scale * direction[i];
             if (!evaluate(at, a.x, a)) continue;
             real apart = real(0);
             for (int i = 0; i < n; ++i) apart += a.residual[i] * a.residual[i];
             if (nearest < real(0) || apart < nearest) best = scale, nearest = apart;
         }
-        for (int i = 0; i < n; ++i) a.x[i] = best * at.p[i];
+        for (int i = 0; i < moving; ++i) a.x[i] = best * direction[i];
     }
 
     // Whether what is left is within a bound of what it is computed from.

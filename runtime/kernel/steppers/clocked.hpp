@@ -5,6 +5,9 @@
 // start (D42). Its steps last as long as the quadrature of g along them says (D43). A state at a given time is the end
 // of a step of the chain that is shortened until it ends there: it has the order of the steps, and the chain goes on
 // as if nobody had asked. Velocities that callers give and get are dq/dt.
+//
+// Where the energy changes, the time is the last coordinate, and minus the energy its momentum (D64). A start sets
+// both.
 #ifndef LOBATTO_KERNEL_CLOCKED_HPP
 #define LOBATTO_KERNEL_CLOCKED_HPP
 
@@ -20,9 +23,9 @@ namespace lobatto {
 // off by a part of the larger of p.v here and where the clock became small. (At walls p.v vanishes, at poles it grows.)
 template <class real>
 struct SmallClock {
-    real energy_of_start{};
-    real largest{};  // rate of the clock until now, of a step
-    real moving{};   // p.v where it became small; 0: it is not
+    real energy_of_start{};  // 0 where the time is a coordinate
+    real largest{};          // rate of the clock until now, of a step
+    real moving{};           // p.v where it became small; 0: it is not
 
     // After a step of this rate.
     bool is_small(real rate) {
@@ -36,8 +39,9 @@ struct SmallClock {
     bool keeps_energy(const Stepper& stepper, const real* q, const real* p) {
         real energy, v[Stepper::n], product = real(0);
         if (stepper.energy(real(0), q, p, &energy) != Status::ok) return false;
+        if constexpr (Stepper::has_time_coordinate) energy += p[Stepper::n - 1];
         if (stepper.velocity(real(0), q, p, v) != Status::ok) return false;
-        for (int k = 0; k < Stepper::n; ++k) product += p[k] * v[k];
+        for (int k = 0; k < Stepper::moving; ++k) product += p[k] * v[k];
         if (moving == real(0)) moving = fabs(product);
         return fabs(energy - energy_of_start) <= real(0.01) * maximum(moving, fabs(product));
     }
@@ -48,8 +52,10 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
     using Chain = Stepper<K, Form::general, Stepping::solved>;
     using Chain::n, Chain::q, Chain::p, Chain::q_before, Chain::coefficients, Chain::step_size, Chain::elapsed;
     using typename Chain::real;
+    static constexpr bool has_time_coordinate = HasTimeCoordinate<K>::value;
+    static constexpr int moving = has_time_coordinate ? n - 1 : n;
 
-    typename K::Parameters values{};                      // the last one is the energy at the start
+    typename K::Parameters values{};                      // the last one is E of (D42), or sigma of (D64)
     LongTime<real> now{}, before{};                       // of the chain: its state, and that a step ago
     real p_before[n]{};                                   // as q_before
     real arrival_time{}, arrival_q[n]{}, arrival_p[n]{};  // the state at the time last asked for
@@ -64,19 +70,29 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
     }
 
     Status start(real time, const real* position, const real* momentum) {
-        Status status = Chain::start(real(0), position, momentum);
-        real energy_of_start = real(0);
-        if (status == Status::ok) status = energy(real(0), position, momentum, &energy_of_start);
-        if (status == Status::ok) status = start(time, position, momentum, energy_of_start);
-        return status;
+        real from[n], p_from[n], energy_of_start = real(0), of_start = real(0);
+        for (int k = 0; k < n; ++k) {
+            from[k] = position[k];
+            p_from[k] = momentum[k];
+        }
+        if constexpr (has_time_coordinate) from[n - 1] = time;
+        Status status = Chain::start(real(0), from, p_from);
+        if (status == Status::ok) status = energy(real(0), from, p_from, &energy_of_start);
+        if constexpr (has_time_coordinate) {
+            p_from[n - 1] = -energy_of_start;
+            if (status == Status::ok) status = scale_of(from, p_from, energy_of_start, of_start);
+        } else {
+            of_start = energy_of_start;
+        }
+        return status == Status::ok ? start(time, from, p_from, of_start) : status;
     }
-    // A start on an orbit whose energy is known.
-    Status start(real time, const real* position, const real* momentum, real energy_of_start) {
-        set_energy(energy_of_start);
+    // A start on an orbit of which that is known what the last parameter says.
+    Status start(real time, const real* position, const real* momentum, real of_start) {
+        K::parameter(values, K::parameter_count) = of_start;
         Status status = Chain::prepare(values, step_size);
         if (status == Status::ok) status = Chain::start(real(0), position, momentum);
         now = before = {time, real(0)};
-        small_clock = {energy_of_start};
+        small_clock = {has_time_coordinate ? real(0) : of_start};
         origin = time;
         arrivals = 0;
         is_recorded = true;
@@ -118,7 +134,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
     }
 
     real time() const { return now.time; }
-    real energy_of_start() const {
+    real known_of_start() const {
         typename K::Parameters copy = values;
         return K::parameter(copy, K::parameter_count);
     }
@@ -128,7 +144,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         for (int i = 0; i < K::nodes; ++i) {
             real position[n], rate[n];
             Chain::polynomial(theta * K::c[i], position, rate);
-            passed += K::b[i] * clock_at(position);
+            passed += K::b[i] * (has_time_coordinate ? rate[n - 1] : clock_at(position));
         }
         return before.time + theta * step_size * passed;
     }
@@ -172,7 +188,16 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
 
 private:
     bool is_ahead(real duration) const { return step_size > real(0) ? duration > real(0) : duration < real(0); }
-    void set_energy(real value) { K::parameter(values, K::parameter_count) = value; }
+    // sigma = g^(1 - a) (|p v / 2| + |H - p v / 2|): the last term of (D64) is as large as those of L.
+    Status scale_of(const real* position, const real* momentum, real energy_of_start, real& sigma) const {
+        real v[n], half = real(0);
+        const Status status = velocity(real(0), position, momentum, v);
+        for (int k = 0; k < moving; ++k) half += real(0.5) * momentum[k] * v[k];
+        sigma = real(0.5) * (fabs(half) + fabs(energy_of_start - half));
+        if (sigma == real(0)) sigma = real(1);
+        if constexpr (has_time_coordinate) sigma *= exp(real(1 - K::pace_exponent) * log(clock_at(position)));
+        return status;
+    }
     real clock_at(const real* position) const { return Formulas<K>::clock(coefficients, real(0), position); }
     void slow_down(const real* position, real* velocity) const {
         const real rate = clock_at(position);

@@ -147,7 +147,7 @@ private:
         }
         for (int i = 0; i < K::nodes; ++i) set_lane(motion.fixed_point.rates[i], lane, real(1));
         origin[lane] = time;
-        small_clock[lane] = {single.energy_of_start()};
+        small_clock[lane] = single.small_clock;
         arrived[lane] = recorded[lane] = 0;
     }
 

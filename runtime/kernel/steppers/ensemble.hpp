@@ -184,11 +184,11 @@ protected:
         const Status status = single.prepare(parameters[lane], step_size);
         return status == Status::ok ? single.start(time, q, p) : status;
     }
-    // The same in the midst of a motion: one with a clock has the energy of its start among its parameters.
+    // The same in the midst of a motion: one with a clock has what is known of its start among its parameters.
     Status go_on_alone(int lane, real time, const real* q, const real* p) {
         if constexpr (is_clocked<K>()) {
             const Status status = single.prepare(parameters[lane], step_size);
-            return status == Status::ok ? single.start(time, q, p, single.energy_of_start()) : status;
+            return status == Status::ok ? single.start(time, q, p, single.known_of_start()) : status;
         } else {
             return begin_alone(lane, time, q, p);
         }

@@ -145,7 +145,7 @@ private:
         partial->tolerance = step->tolerance;
         if (done == Status::ok) {
             if constexpr (is_clocked<K>())
-                done = partial->start(time, q, p, step->energy_of_start());
+                done = partial->start(time, q, p, step->known_of_start());
             else
                 done = partial->start(time, q, p);
         }

@@ -311,7 +311,7 @@ private:
         return Status::ok;
     }
 
-    // sum_i h b_i clock(Q_i) of the stages just solved.
+    // sum_i h b_i dt/dtau of the stages just solved: clock(Q_i), or the velocity of the time.
     real time_passed(Arrays& a) {
         real passed = real(0);
         if constexpr (K::clocked) {
@@ -320,7 +320,7 @@ private:
             for (int i = 0; i < r; ++i) {
                 this->node_variables(q, p, a.Y, i, a.z);
                 for (int b = 0; b < active; ++b) Q[K::active_index[b]] = a.z[active + b];
-                rates[i] = Formulas<K>::clock(coefficients, this->time(), Q);
+                rates[i] = HasTimeCoordinate<K>::value ? a.z[active - 1] : Formulas<K>::clock(coefficients, this->time(), Q);
                 passed += K::b[i] * rates[i];
             }
         }
