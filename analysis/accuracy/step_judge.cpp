@@ -25,26 +25,10 @@ constexpr std::size_t force_looks = 6;       // at states
 // Rounding of forces beside their size that is worth a warning, and beside the measured error.
 constexpr double loud_rounding = 1e-6, seen_by_companions = 10;
 
-// Bijective, and in no way regular (S. Vigna's splitmix64); 0 stays 0.
-std::uint64_t scrambled(std::int64_t number) {
-    std::uint64_t z = static_cast<std::uint64_t>(number) * 0x9e3779b97f4a7c15;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
-    return z ^ (z >> 31);
-}
-
 }  // namespace
 
-StepJudge::StepJudge(const Scene& scene) : groups_(amplitude_groups(scene)), rows_a_step_(1 + scene.outputs.dense) {}
-
-void StepJudge::keep(std::int64_t number, std::vector<double> row) {
-    const std::uint64_t place = scrambled(number);
-    if (some_.size() == most_judged_states) {
-        if (place > std::prev(some_.end())->first) return;
-        some_.erase(std::prev(some_.end()));
-    }
-    some_.emplace(place, State{number, std::move(row)});
-}
+StepJudge::StepJudge(const Scene& scene)
+    : groups_(amplitude_groups(scene)), rows_a_step_(1 + scene.outputs.dense), some_(most_judged_states) {}
 
 void StepJudge::observe(const Records& records) {
     const std::size_t columns = static_cast<std::size_t>(records.columns);
@@ -58,8 +42,7 @@ void StepJudge::observe(const Records& records) {
         const std::int64_t number = seen_++;
         if (number % rows_a_step_ != 0) continue;
         hardest_.observe({row, row + columns}, records.energy != nullptr ? records.energy[i] : std::nan(""));
-        if (some_.size() < most_judged_states || scrambled(number) < some_.rbegin()->first)
-            keep(number, {row, row + columns});
+        some_.observe(number, row, columns);
     }
 }
 
@@ -70,10 +53,7 @@ std::vector<double> StepJudge::save() const {
     const std::vector<double> by_hardest = hardest_.save();
     all.push_back(static_cast<double>(by_hardest.size()));
     all.insert(all.end(), by_hardest.begin(), by_hardest.end());
-    for (const auto& [place, state] : some_) {
-        all.push_back(static_cast<double>(state.number));
-        all.insert(all.end(), state.row.begin(), state.row.end());
-    }
+    some_.save(all);
     return all;
 }
 
@@ -91,10 +71,7 @@ void StepJudge::restore(const std::vector<double>& saved) {
     most_ = take(width);
     const std::ptrdiff_t by_hardest = std::llround(*at++);
     hardest_.restore(take(by_hardest), static_cast<std::size_t>(1 + width));
-    while (saved.end() - at > 1 + width) {
-        const std::int64_t number = std::llround(*at++);
-        keep(number, take(1 + width));
-    }
+    some_.restore(&*at, saved.data() + saved.size(), static_cast<std::size_t>(1 + width));
 }
 
 // Which coordinates errors alone move (rests_beside).
@@ -103,7 +80,7 @@ std::vector<bool> StepJudge::resting(LoadedStepper<double>& stepper, const Traje
     Rows rows{{request.time}};
     rows[0].insert(rows[0].end(), request.q.begin(), request.q.end());
     rows[0].insert(rows[0].end(), request.p.begin(), request.p.end());
-    for (const auto& [place, state] : some_) rows.push_back(state.row);
+    for (const SomeStates::State& state : some_.in_order()) rows.push_back(state.row);
     return rests_beside(stepper, request.step, rows, sizes, slight(sizes));
 }
 
@@ -127,7 +104,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
         if (radians > judgement.radians) judgement.radians = radians;
     };
     int looks = 0;
-    for (const auto& [place, state] : some_) {
+    for (const SomeStates::State& state : some_.in_order()) {
         if (n > frequency_limit || looks++ == frequency_looks) break;
         const auto middle = state.row.begin() + 1 + static_cast<std::ptrdiff_t>(n);
         const std::vector<double> q(state.row.begin() + 1, middle), p(middle, state.row.end());
@@ -147,7 +124,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
     // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
     std::vector<double> by_constraints;
     const ConstraintSizes constraints(outline.system);
-    for (const auto& [place, state] : some_)
+    for (const SomeStates::State& state : some_.in_order())
         constraints.widen(by_constraints, state.row[0], state.row.data() + 1, request.parameters);
     const std::vector<bool> moves =
         moving(least_, most_, places_of(least_, most_, by_constraints), rounding_of_run(kernel->epsilon));
@@ -167,7 +144,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
                                                               request.parameters, request.step, measure);
     if (unresolved) judgement.unresolved = {1 + std::llround((*unresolved - request.time) / request.step), *unresolved};
     std::vector<std::vector<double>> rows;
-    for (const auto& [place, state] : some_)
+    for (const SomeStates::State& state : some_.in_order())
         if (rows.size() < force_looks) rows.push_back(state.row);
     std::vector<bool> swings(n);  // by more than the roundings of all steps
     for (std::size_t k = 0; k < n; ++k)

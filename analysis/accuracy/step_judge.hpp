@@ -4,12 +4,12 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/accuracy/hardest_steps.hpp"
+#include "analysis/accuracy/watch/some_states.hpp"
 #include "generator/mechanics/outline.hpp"
 #include "runtime/run/trajectory.hpp"
 
@@ -18,7 +18,7 @@ namespace lobatto {
 class StepJudge {
 public:
     // Looks at the kept states go by: how far the motion goes, where it changes most, and a few states of all its
-    // times, chosen as if at random: equal distances could go along with the motion's own rhythm.
+    // times.
     explicit StepJudge(const Scene& scene);
     void observe(const Records& records);
 
@@ -45,14 +45,9 @@ private:
     std::vector<int> groups_;           // coordinates that share an amplitude have the same number
     std::int64_t rows_a_step_;          // states between the steps are less accurate than those at them
     std::vector<double> least_, most_;  // 2n
-    struct State {
-        std::int64_t number;
-        std::vector<double> row;  // t, q, p
-    };
-    std::map<std::uint64_t, State> some_;  // by a scrambled number: those with the smallest
+    SomeStates some_;
     HardestSteps hardest_;
     std::int64_t seen_ = 0;
-    void keep(std::int64_t number, std::vector<double> row);
     std::vector<bool> resting(LoadedStepper<double>& stepper, const TrajectoryRequest& request,
                               const std::vector<double>& sizes) const;
 };

@@ -346,6 +346,16 @@ GiNaC::numeric Scene::value_of(const GiNaC::ex& expression, const std::vector<Gi
     return real_value(expression, values_of(parameters, given));
 }
 
+GiNaC::numeric Scene::value_at_start(const GiNaC::ex& expression, const std::vector<GiNaC::ex>& velocities) const {
+    GiNaC::exmap values = values_of(parameters, {});
+    values[time] = 0;
+    for (std::size_t k = 0; k < coordinates.size(); ++k) {
+        values[coordinates[k].position] = value_of(initial_position[k]);
+        values[coordinates[k].velocity] = value_of(velocities[k]);
+    }
+    return real_value(expression, values);
+}
+
 GiNaC::numeric Scene::evaluate(const GiNaC::ex& expression, const std::string& what,
                                const std::vector<GiNaC::ex>& given) const {
     try {

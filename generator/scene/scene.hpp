@@ -230,6 +230,8 @@ struct Scene {
     // The value of an expression in the parameters, with the parameters at their scene values unless given, in scene
     // order: 60 decimal digits; throws NoValue when it is not a finite real number.
     GiNaC::numeric value_of(const GiNaC::ex& expression, const std::vector<GiNaC::ex>& parameter_values = {}) const;
+    // The same of one that holds the motion too, at the start with these velocities, one for each coordinate.
+    GiNaC::numeric value_at_start(const GiNaC::ex& expression, const std::vector<GiNaC::ex>& velocities) const;
     // The same; throws InputError naming `what`.
     GiNaC::numeric evaluate(const GiNaC::ex& expression, const std::string& what,
                             const std::vector<GiNaC::ex>& parameter_values = {}) const;

@@ -3,6 +3,8 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include <cmath>
 #include <sstream>
 #include <string>
@@ -11,6 +13,7 @@
 #include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
 #include "generator/mechanics/algebra/sample.hpp"
+#include "generator/mechanics/clock/automatic_clock.hpp"
 #include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/structure/scaled_mass.hpp"
 #include "generator/pipeline.hpp"
@@ -488,6 +491,57 @@ TEST_CASE("an automatic clock follows the poles of the Lagrangian") {
                          InputError);
     CHECK_THROWS_WITH_AS(clock_of("(x'^2 + y'^2)/2 - x^2/2"), doctest::Contains("and there is none; write a formula"),
                          InputError);
+}
+
+TEST_CASE("an automatic clock follows encounters with light bodies, which the potential hardly knows") {
+    // In the restricted problem of mass ratio 0.001 a body falls past the planet, within 0.02.
+    const std::string text =
+        "lagrangian = \"(x'^2 + y'^2)/2 + (1 - mu)/sqrt(x^2 + y^2) + mu/sqrt((x - 1)^2 + y^2)\"\n[coordinates]\n"
+        "x = { position = 1.3, velocity = -0.1 }\ny = { position = 0.02, velocity = 0 }\n[parameters]\nmu = 0.001\n"
+        "[method]\npoints = 9\nclock = \"auto\"\n[run]\nstep = 0.15\nuntil = 1.2\n";
+    const Ended ended = run(scene_of(text));
+    CHECK(ended.energy_error < 1e-9);
+    std::string by_potential = text;
+    by_potential.replace(text.find("\"auto\""), 6, "\"((1 - mu)/sqrt(x^2 + y^2) + mu/sqrt((x - 1)^2 + y^2))^(-3/2)\"");
+    CHECK(run(scene_of(by_potential)).energy_error > 1e3 * ended.energy_error);
+    // Three equal bodies have the shorter formula; exact numbers of many digits do not grow in it.
+    const Scene outer = read_scene(LOBATTO_SOURCE_DIR "/scenes/outer_solar_system.toml");
+    CHECK(emit(derive(with_automatic_clock(outer))).header.find("clocked = true") != std::string::npos);
+}
+
+TEST_CASE("the last part of a step that runs far out is measured, too") {
+    const test::TemporaryFolder folder;
+    const std::string path = folder / "scene.toml";
+    test::write_text(path,
+                     "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\nx = { position = 1, "
+                     "velocity = 0 }\ny = { position = 0, velocity = \"sqrt(3)\" }\n[method]\npoints = 9\nclock = "
+                     "\"auto\"\n[run]\nstep = 0.3\nuntil = 150\n");
+    const test::Finished finished = test::run({LOBATTO_PROGRAM, "run", path, "-o", folder / "run.csv", "--json"});
+    REQUIRE(finished.exit_code == 0);
+    const double printed = nlohmann::json::parse(finished.out).at("measured_error").at("at_end");
+    // From the hyperbola: r = e cosh(u) - 1, t = e sinh(u) - u for e = 2.
+    double u = 5;
+    for (int i = 0; i < 100; ++i) u -= (2 * std::sinh(u) - u - 150) / (2 * std::cosh(u) - 1);
+    const std::vector<double> end = test::read_trajectory(folder / "run.csv").rows.back();
+    const double truth =
+        std::hypot(end[1] - (2 - std::cosh(u)), end[2] - std::sqrt(3.0) * std::sinh(u)) / std::sqrt(3.0) / std::sinh(u);
+    CHECK(printed > truth / 4);
+    CHECK(printed < truth * 4);
+}
+
+TEST_CASE("a run with a clock that leaves its energy by half of the motion's ends with that") {
+    const test::TemporaryFolder folder;
+    const std::string path = folder / "scene.toml";
+    test::write_text(path,
+                     "lagrangian = \"(x'^2 + y'^2)/2 + x*y' - y*x' + (x^2 + y^2)/2 + U\"\n[definitions]\n"
+                     "U = \"(1 - mu)/sqrt((x + mu)^2 + y^2) + mu/sqrt((x - 1 + mu)^2 + y^2)\"\n[coordinates]\n"
+                     "x = { position = 0.5, velocity = 0 }\n"
+                     "y = { position = 0, velocity = \"sqrt(2*((1 - mu)/(0.5 + mu) + mu/(0.5 - mu)) + 0.25 - C)\" }\n"
+                     "[parameters]\nmu = 0.01215\nC = 2.887179487179487\n[method]\npoints = 10\n"
+                     "clock = \"U^(-3/2)\"\n[run]\nstep = 0.57\nuntil = 50\n");
+    const test::Finished finished = test::run({LOBATTO_PROGRAM, "run", path, "-o", folder / "run.csv"});
+    CHECK(finished.exit_code == 3);
+    CHECK(finished.err.find("the energy, which the motion conserves, is off there by") != std::string::npos);
 }
 
 TEST_CASE("what has no clock says so") {

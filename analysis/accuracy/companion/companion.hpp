@@ -44,8 +44,9 @@ std::int64_t companion_steps(std::int64_t steps);
 // Of a run with explicit time between two comparisons, at least: in fewer steps common divisors cannot be avoided.
 inline constexpr std::int64_t fewest_driven_steps = 8;
 
-// Of a companion with a clock: its steps for one of the run, both equally long in the time of the clock.
-inline constexpr double clocked_ratio = 1.5;
+// Of a companion with a clock: its steps for one of the run, both equally long in the time of the clock. It is no
+// fraction, 2 sqrt(3) - 2: else both would come to the same places, and shorten the same step to a given time.
+inline constexpr double clocked_ratio = 1.4641016151377546;
 
 // Of the run's tolerance, the companion's: what the run leaves of its equations is measured, too.
 inline constexpr double finer_iteration = 1e-3;

@@ -13,23 +13,28 @@ namespace lobatto {
 
 namespace {
 
-constexpr std::size_t most_states = 8;                          // for the mean kinetic energy
-constexpr std::int64_t longest_stride = std::int64_t{1} << 31;  // mixed numbers have 31 bits
-constexpr double departed = 0.5;                                // of it
-constexpr double walk = 2;                                      // times the rms of a random walk
-constexpr int fewest_states = 3;                                // of a mean of some
-constexpr double coarse = 0.05;                                 // third differences of the energy over second ones
-constexpr double most_energy = 1e300;                           // sums of it stay numbers
-constexpr double a_rounding = 0x1p-52;  // of what the energy is computed from: below it no double can tell
+constexpr std::size_t most_states = 16;  // for the mean kinetic energy
+constexpr double departed = 0.5;         // of it
+constexpr double walk = 2;               // times the rms of a random walk
+constexpr int fewest_states = 3;         // of a mean of some
+constexpr double coarse = 0.05;          // third differences of the energy over second ones
+constexpr double most_energy = 1e300;    // sums of it stay numbers
+constexpr double a_rounding = 0x1p-52;   // of what the energy is computed from: below it no double can tell
 
 struct State {
     double time;
     std::vector<double> q, p, v;  // v is empty where momenta determine none
+    std::vector<double> v_later;  // what the force of a step makes of it: at turning points v tells nothing
 };
-State state_of(const LoadedStepper<double>& stepper, const std::vector<double>& row) {
+State state_of(const LoadedStepper<double>& stepper, const std::vector<double>& row, double step) {
     const auto middle = row.begin() + 1 + std::ssize(row) / 2;
-    State state{row[0], {row.begin() + 1, middle}, {middle, row.end()}, {}};
+    State state{row[0], {row.begin() + 1, middle}, {middle, row.end()}, {}, {}};
     if (stepper.velocity(state.time, state.q, state.p, state.v) != LOBATTO_OK) state.v.clear();
+    if (state.v.empty()) return state;
+    std::vector<double> momentum, force, kicked = state.p;
+    stepper.slopes(state.time, state.q, state.v, momentum, force);
+    for (std::size_t k = 0; k < kicked.size(); ++k) kicked[k] += step * force[k];
+    if (stepper.velocity(state.time, state.q, kicked, state.v_later) != LOBATTO_OK) state.v_later = state.v;
     return state;
 }
 
@@ -38,7 +43,8 @@ State state_of(const LoadedStepper<double>& stepper, const std::vector<double>& 
 bool is_too_coarse(ExactEnergy& energy, const std::vector<State>& states, double step) {
     const auto may_be = [&](std::size_t k) {
         return std::all_of(states.begin(), states.end(), [&](const State& state) {
-            return !state.v.empty() && std::fabs(state.q[k]) > 1e10 * std::fabs(step * state.v[k]);
+            return !state.v.empty() && std::fabs(state.q[k]) > 1e10 * std::fabs(step * state.v[k]) &&
+                   std::fabs(state.q[k]) > 1e10 * std::fabs(step * state.v_later[k]);
         });
     };
     for (std::size_t k = 0; k < states.front().q.size(); ++k) {
@@ -91,23 +97,17 @@ std::string why(const Scene& scene, double step, bool too_coarse) {
         step / 2);
 }
 
-// Mixed, so that states whose mixed numbers are multiples of something are at no equal distances: those of a motion
-// whose period they met would all be at one place, perhaps at rest.
-std::int64_t mixed_number(std::int64_t number) {
-    return static_cast<std::int64_t>(static_cast<std::uint64_t>(number) * 0x9e3779b97f4a7c15 >> 33);
-}
-
 }  // namespace
 
 bool EnergyWatch::can_watch(const Outline& outline) {
-    return !outline.scene.clock && outline.conserves_energy() &&
-           outline.system.q.size() <= ExactEnergy::most_coordinates;
+    return outline.conserves_energy() && outline.system.q.size() <= ExactEnergy::most_coordinates;
 }
 
 EnergyWatch::EnergyWatch(const Outline& outline, const Kernel& kernel)
     : watches_(kernel->has_energy != 0 && can_watch(outline)),
       columns_(1 + 2 * outline.system.q.size()),
-      rows_a_step_(1 + outline.scene.outputs.dense) {}
+      rows_a_step_(1 + outline.scene.outputs.dense),
+      some_(most_states) {}
 
 void EnergyWatch::observe(const Records& records) {
     if (!watches_) return;
@@ -124,50 +124,34 @@ void EnergyWatch::observe(const Records& records) {
             else
                 energy_error_ = error;
         }
-        const std::int64_t number = (seen_ - 1) / rows_a_step_;
-        if (mixed_number(number) % stride_ != 0 || some_.size() >= 2 * most_states) continue;
-        some_.emplace_back(row, row + columns_);
-        numbers_.push_back(number);
-        while (some_.size() >= 2 * most_states && stride_ < longest_stride) {
-            stride_ *= 2;
-            std::size_t kept = 0;  // about half of them; the start always
-            for (std::size_t j = 0; j < some_.size(); ++j)
-                if (mixed_number(numbers_[j]) % stride_ == 0) {
-                    some_[kept] = some_[j];
-                    numbers_[kept++] = numbers_[j];
-                }
-            some_.resize(kept);
-            numbers_.resize(kept);
-        }
+        some_.observe((seen_ - 1) / rows_a_step_, row, columns_);
     }
 }
 
 std::vector<double> EnergyWatch::save() const {
-    std::vector<double> all{static_cast<double>(seen_),
-                            static_cast<double>(stride_),
-                            energy_start_,
-                            energy_error_,
-                            static_cast<double>(lost_),
-                            static_cast<double>(leaving_.size()),
-                            static_cast<double>(numbers_.size())};
-    all.insert(all.end(), numbers_.begin(), numbers_.end());
-    for (const States& states : {leaving_, some_})
-        for (const std::vector<double>& row : states) all.insert(all.end(), row.begin(), row.end());
+    std::vector<double> all{static_cast<double>(seen_), energy_start_, energy_error_, static_cast<double>(lost_),
+                            static_cast<double>(leaving_.size())};
+    for (const std::vector<double>& row : leaving_) all.insert(all.end(), row.begin(), row.end());
+    some_.save(all);
     return all;
 }
 
 void EnergyWatch::restore(const std::vector<double>& saved) {
     auto at = saved.begin();
     seen_ = std::llround(*at++);
-    stride_ = std::llround(*at++);
     energy_start_ = *at++;
     energy_error_ = *at++;
     lost_ = *at++ != 0;
     const auto leaving = static_cast<std::size_t>(std::llround(*at++));
-    numbers_.resize(static_cast<std::size_t>(std::llround(*at++)));
-    for (std::int64_t& number : numbers_) number = std::llround(*at++);
-    for (; at < saved.end(); at += static_cast<std::ptrdiff_t>(columns_))
-        (leaving_.size() < leaving ? leaving_ : some_).emplace_back(at, at + static_cast<std::ptrdiff_t>(columns_));
+    for (; leaving_.size() < leaving; at += static_cast<std::ptrdiff_t>(columns_))
+        leaving_.emplace_back(at, at + static_cast<std::ptrdiff_t>(columns_));
+    some_.restore(&*at, saved.data() + saved.size(), columns_);
+}
+
+EnergyWatch::States EnergyWatch::rows_of_some() const {
+    States rows;
+    for (SomeStates::State& state : some_.in_order()) rows.push_back(std::move(state.row));
+    return rows;
 }
 
 // In 60 digits: of small motions the energy in double is rounding.
@@ -175,7 +159,7 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
                                    const TrajectoryRequest& request) const {
     LoadedStepper<double> stepper(kernel);
     if (leaving_.size() < 2 || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
-        rests_on_constraints(outline.system, some_, request.parameters, kernel->epsilon))
+        rests_on_constraints(outline.system, rows_of_some(), request.parameters, kernel->epsilon))
         return "";
     ExactEnergy energy(outline, request.parameters);
     const auto energy_of = [&](const State& state) {
@@ -187,8 +171,8 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
     };
     std::vector<State> some;
     std::vector<double> kinetic;
-    for (const std::vector<double>& row : some_) {
-        some.push_back(state_of(stepper, row));
+    for (const std::vector<double>& row : rows_of_some()) {
+        some.push_back(state_of(stepper, row, request.step));
         kinetic.push_back(kinetic_of(some.back()));
     }
     // The start is no moment like others: it counts where there is nothing else.
@@ -200,7 +184,7 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
                 sum += kinetic[i], ++states;
         return states >= fewest_states ? std::optional(sum / states) : std::nullopt;
     };
-    const auto start = energy_of(state_of(stepper, leaving_.front()));
+    const auto start = energy_of(state_of(stepper, leaving_.front(), request.step));
     const double mean = mean_until(HUGE_VAL).value_or(*std::max_element(kinetic.begin(), kinetic.end()));
     if (!start || !(mean > 0)) return "";
     const bool too_coarse = is_too_coarse(energy, some, request.step);
@@ -210,7 +194,7 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
     };
     const auto first_beyond = [&](const auto& scale_of) -> std::optional<Departure> {
         for (const std::vector<double>& row : leaving_) {
-            const State state = state_of(stepper, row);
+            const State state = state_of(stepper, row, request.step);
             if (state.v.empty()) continue;  // nothing can be told
             const auto here = energy_of(state);
             if (!here) return Departure{state, std::nullopt};
@@ -232,10 +216,11 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
     };
     const auto [state, error] = *first_beyond(scale_at);
     return fmt::format(
-        "the run is wrong {}from step {} on, at t = {:.6g}, q = {}, p = {}: the energy, which the motion conserves, "
-        "{}. {}",
-        request.every > 1 ? "at the latest " : "", std::llround((state.time - request.time) / request.step), state.time,
-        list_text(state.q), list_text(state.p),
+        "the run is wrong {} on, at t = {:.6g}, q = {}, p = {}: the energy, which the motion conserves, {}. {}",
+        outline.scene.clock ? "from there"
+                            : fmt::format("{}from step {}", request.every > 1 ? "at the latest " : "",
+                                          std::llround((state.time - request.time) / request.step)),
+        state.time, list_text(state.q), list_text(state.p),
         error ? fmt::format("is off there by {:.2g} of the mean kinetic energy{}",
                             cln::double_approx(*error) / scale_at(state), scale_at(state) < mean ? " until then" : "")
               : "is no real number there",

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/accuracy/watch/some_states.hpp"
 #include "generator/mechanics/outline.hpp"
 #include "runtime/run/trajectory.hpp"
 
@@ -36,11 +37,12 @@ private:
     bool watches_;
     std::size_t columns_;
     std::int64_t rows_a_step_;  // the energies of states between the steps are not conserved as well
-    std::int64_t seen_ = 0, stride_ = 1;
+    std::int64_t seen_ = 0;
     double energy_start_ = 0, energy_error_ = 0;
-    bool lost_ = false;                  // an energy in double that is no number
-    States some_, leaving_;              // the first of `leaving_` is the start
-    std::vector<std::int64_t> numbers_;  // of `some_`, counted in steps
+    bool lost_ = false;  // an energy in double that is no number
+    SomeStates some_;
+    States leaving_;  // the first is the start
+    States rows_of_some() const;
 };
 
 }  // namespace lobatto

@@ -3,12 +3,28 @@
 
 namespace lobatto {
 
+namespace {
+
+// L of the velocities dq/dt, also where the system is one in the time of a clock.
+GiNaC::ex in_time(const Outline& outline) {
+    const std::optional<Clock>& clock = outline.scene.clock;
+    if (!clock) return outline.system.lagrangian;
+    GiNaC::exmap of_clock;
+    for (const GiNaC::symbol& v : outline.system.v) of_clock[v] = v * clock->rate;
+    return clock->lagrangian.subs(of_clock, GiNaC::subs_options::no_pattern);
+}
+
+}  // namespace
+
 ExactEnergy::ExactEnergy(const Outline& outline, const std::vector<double>& parameters) : system_(outline.system) {
     for (std::size_t i = 0; i < parameters.size(); ++i)
         formulas_.set(system_.parameters[i], float_of(GiNaC::numeric(parameters[i])));
-    GiNaC::ex energy = -system_.lagrangian;
+    const GiNaC::ex lagrangian = in_time(outline);
+    const std::vector<GiNaC::ex> momentum =
+        outline.scene.clock ? gradient_of(terms_of(lagrangian, system_.motion()), system_.v) : system_.momentum;
+    GiNaC::ex energy = -lagrangian;
     for (std::size_t k = 0; k < system_.q.size(); ++k) {
-        energy += system_.v[k] * system_.momentum[k];
+        energy += system_.v[k] * momentum[k];
         for (const GiNaC::symbol& symbol : {system_.q[k], system_.v[k]}) formulas_.set(symbol, 0);
     }
     energy_ = formulas_.convert({energy});

@@ -16,7 +16,7 @@ public:
     // the positions and velocities are.
     ExactEnergy(const Outline& outline, const std::vector<double>& parameters);
 
-    // H = q'.dL/dq' - L at positions and velocities, n each.
+    // H = q'.dL/dq' - L at positions and velocities dq/dt, n each.
     struct Energy {
         cln::cl_R value;
         std::optional<cln::cl_R> moving;  // H(q, q') - H(q, 0), the kinetic energy; none where rest is impossible

@@ -107,6 +107,8 @@ bool SweepWatch::run_again(const EnsembleTrajectory& trajectory) {
     again.step = request_.step;
     again.tolerance = request_.tolerance;
     again.steps = trajectory.steps_done;
+    again.arrivals = request_.arrivals;
+    again.arrivals.keeps_chain = again.arrivals.interval != 0;
     again.interrupted = request_.interrupted;
     EnergyWatch watch(outline_, *alone_);
     again.sink = [&](const Records& records) { watch.observe(records); };

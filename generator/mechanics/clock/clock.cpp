@@ -124,7 +124,7 @@ private:
         }
     }
     void require_positive_rate() const {
-        const GiNaC::numeric rate = scene_.value_of(at_start(g_));
+        const GiNaC::numeric rate = at_start(g_);
         if (!rate.is_positive())
             fail_at_clock(scene_,
                           fmt::format("the clock is {:.6g} at the start; it must be positive wherever the motion goes",
@@ -132,14 +132,8 @@ private:
     }
 
     ex in_clock_time(const ex& expression) const { return expression.subs(slower_, GiNaC::subs_options::no_pattern); }
-    ex at_start(const ex& expression) const {
-        GiNaC::exmap values{{scene_.time, 0}};
-        for (std::size_t k = 0; k < scene_.coordinates.size(); ++k) {
-            values[scene_.coordinates[k].position] = scene_.initial_position[k];
-            values[scene_.coordinates[k].velocity] = rates_[k];
-        }
-        return expression.subs(values, GiNaC::subs_options::no_pattern);
-    }
+    // In numbers: exact formulas of starts with many digits have thousands of them.
+    GiNaC::numeric at_start(const ex& expression) const { return scene_.value_at_start(expression, rates_); }
 
     // sigma g^a (w_t / g - 1)^2 / 2 of (D64), a power of the pace w_t at a time.
     ex kept_pace(const ex& sigma) const {
@@ -161,14 +155,13 @@ private:
 
     // E = v . dL/dv - L, or the sigma that makes the last term of (D64) as large as the terms of L.
     GiNaC::numeric number_of_start() const {
-        ex moving = 0;  // v . dL/dv
+        GiNaC::numeric moving = 0;  // v . dL/dv
         const std::vector<ex> momentum = gradient_of(terms_of(scene_.lagrangian, motion_), v_);
         for (std::size_t k = 0; k < v_.size(); ++k) moving += at_start(v_[k] * momentum[k]);
-        const auto value = [&](const ex& formula) { return scene_.evaluate(formula, "the energy at the start"); };
-        const ex energy = moving - at_start(scene_.lagrangian);
-        if (!has_time_coordinate(scene_)) return value(energy);
-        const GiNaC::numeric size = GiNaC::abs(value(moving / 2)) + GiNaC::abs(value(energy - moving / 2));
-        return size.is_zero() ? GiNaC::numeric(1) : size * value(at_start(power_of(g_, 1 - pace_exponent(g_))));
+        const GiNaC::numeric energy = moving - at_start(scene_.lagrangian);
+        if (!has_time_coordinate(scene_)) return energy;
+        const GiNaC::numeric size = GiNaC::abs(moving / 2) + GiNaC::abs(energy - moving / 2);
+        return size.is_zero() ? GiNaC::numeric(1) : size / 2 * at_start(power_of(g_, 1 - pace_exponent(g_)));
     }
 
     // Of a term that is homogeneous in the velocities: so that g need not be divided by and multiplied with again.
