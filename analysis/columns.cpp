@@ -111,7 +111,13 @@ private:
 std::vector<std::pair<std::string, std::string>> names_beside(const Scene& scene) {
     std::vector<std::pair<std::string, std::string>> names;
     if (scene.outputs.multipliers)
-        for (const Constraint& constraint : scene.constraints) names.emplace_back("lambda_" + constraint.name, "");
+        for (const Constraint& constraint : scene.constraints) {
+            std::string name = "lambda_" + constraint.name;
+            while (std::any_of(scene.coordinates.begin(), scene.coordinates.end(),
+                               [&](const Coordinate& one) { return name == one.name || name == "p_" + one.name; }))
+                name += '_';
+            names.emplace_back(name, "");
+        }
     for (const Column& column : scene.outputs.columns) names.emplace_back(column.name, column.unit);
     return names;
 }

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "analysis/exact_start.hpp"
-#include "generator/scene/time_coordinate.hpp"
 #include "runtime/error.hpp"
 #include "runtime/run/other_velocity.hpp"
 #include "runtime/run/parts.hpp"
@@ -128,7 +127,7 @@ TrajectoryRequest request_of(const Scene& scene, std::int64_t steps, LoadedStepp
         if (start.from_velocity)
             request.p = momentum_of_start(stepper, request.time, request.q, request.p, scene.path + ": ");
         none.status = stepper.start(request.time, request.q, request.p);
-        if (none.status == LOBATTO_OK && has_time_coordinate(scene))  // the kernel knows its momentum
+        if (none.status == LOBATTO_OK && scene.has_time_coordinate())  // the kernel knows its momentum
             stepper.state(request.time, request.q, request.p);
     }
     none.q = request.q;

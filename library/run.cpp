@@ -46,6 +46,8 @@ void finish(Trajectory& trajectory, const OpenedRun& run, const TrajectoryResult
     trajectory.warnings = verdict.warnings;
     if (!verdict.error) return;
     if (verdict.error->is_known_at_end()) trajectory.error = verdict.error->at_end;
+    if (const std::string part = not_measured_at_end(*verdict.error); !part.empty())
+        trajectory.warnings.push_back(part);
     trajectory.largest_error = verdict.error->worst();
     trajectory.doubling = verdict.error->doubling;
 }

@@ -190,8 +190,10 @@ struct Stepper::Parts {
             take();
         } catch (...) {
             parameters = before;
-            last_step = step_before;
-            if (!are_inputs || table.events == 0) restart();  // a kernel that watches has refused them itself
+            if (are_inputs && table.events > 0)
+                last_step = step_before;  // a kernel that watches has refused them itself
+            else
+                restart();
             throw;
         }
     }
@@ -438,6 +440,10 @@ std::vector<double> Stepper::tangent() const {
             throw InputError(
                 "tangent: this kernel has no derivative of a step: the scene leaves it out, or has "
                 "constraints");
+        if (parts.is_clocked())
+            throw InputError(
+                "tangent: with a clock a step lasts as long as the motion makes it, so there is no derivative at a "
+                "time; use equal steps (the setting clock = \"none\"), or differences of runs");
         if (parts.is_cut_next())
             throw ComputationError(
                 "tangent: a wall or a switch cuts the step from here, and this is the derivative of a whole one. Take "

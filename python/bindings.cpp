@@ -408,7 +408,7 @@ void add_stepper(py::module_& module) {
             [](const lob::Stepper& stepper) {
                 return owned(stepper.tangent(), static_cast<py::ssize_t>(2 * stepper.coordinates()));
             },
-            "d(q1, p1)/d(q, p) of the next step, 2n x 2n.")
+            "d(q1, p1)/d(q, p) of the next step, 2n x 2n; with a clock there is none.")
         .def(
             "take_events", [](lob::Stepper& stepper) { return events_of(stepper.take_events(), stepper.events()); },
             "Events, stops and impacts since the last call: (what, t, q, p); of an impact the momenta after it.")

@@ -91,7 +91,7 @@ const std::vector<Room> rooms = {
       "generator/scene"}},
     {"generator/mechanics/constraints",
      {"generator/formula/", "generator/graph", "generator/mechanics/system", "generator/scene"}},
-    {"generator/mechanics/clock", {"generator/mechanics/system", "generator/scene"}},
+    {"generator/mechanics/clock", {"generator/formula/", "generator/mechanics/system", "generator/scene"}},
     {"generator/mechanics/structure",
      {"generator/formula/", "generator/graph", "generator/mechanics/algebra", "generator/mechanics/repeated",
       "generator/mechanics/system", "generator/method", "generator/scene"}},

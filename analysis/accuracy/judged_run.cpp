@@ -20,6 +20,9 @@ namespace lobatto {
 namespace {
 
 // Of a motion that may come near a pole.
+// Energy errors, relative, that are larger than the errors of positions by so much tell that those have grown since.
+constexpr double told_by_energy = 100;
+
 std::string clock_advice(const Scene& scene) {
     const bool helps = !scene.clock && has_automatic_clock(scene);
     return helps ? ", or clock = \"auto\" under [method], whose steps follow close encounters" : "";
@@ -147,11 +150,19 @@ double known_error(const PreparedRun& run, const std::optional<MeasuredError>& e
 
 }  // namespace
 
+std::string ends_early(const PreparedRun& run, const TrajectoryResult& result) {
+    if (run.steps.reaches_end || result.status != LOBATTO_OK || result.stop >= 0 || result.interrupted) return "";
+    return "The end time is not a multiple of the step: the run ends at the last multiple before it.";
+}
+
 RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                       RunObservers& observers, bool accepts_lost) {
     const Scene& scene = run.scene;
     RunVerdict verdict;
     if (observers.companion) verdict.error = observers.companion->finish(result);
+    if (verdict.error && !verdict.error->complete && run.outline.conserves_energy() &&
+        result.energy_error_largest > told_by_energy * verdict.error->at_end * std::fabs(result.energy_start))
+        verdict.error->at_end = std::nan("");
     if (observers.began_unmeasured)
         verdict.warnings.emplace_back(
             "the error is not measured, because an earlier part of the run had no companion, "

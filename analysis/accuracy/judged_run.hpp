@@ -39,6 +39,9 @@ struct PreparedRun {
 PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general = false,
                         std::optional<Method> companion = {});
 
+// That a run which went on to its end ends before the time that was asked for. Empty: it does not.
+std::string ends_early(const PreparedRun& run, const TrajectoryResult& result);
+
 // All that looks at the states of a run, and what each of them has to keep for a later run that goes on.
 class RunObservers {
 public:

@@ -13,7 +13,6 @@
 #include "generator/formula/expression.hpp"
 #include "generator/formula/text/suggest.hpp"
 #include "generator/method/splitting.hpp"
-#include "generator/scene/time_coordinate.hpp"
 
 namespace lobatto {
 
@@ -163,7 +162,7 @@ VariedName varied_name(const Scene& scene, const std::string& name, const std::s
     }
     for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
         const Coordinate& coordinate = scene.coordinates[k];
-        if (has_time_coordinate(scene) && k + 1 == scene.coordinates.size()) {
+        if (scene.has_time_coordinate() && k + 1 == scene.coordinates.size()) {
             if (name == coordinate.name || name == coordinate.name + "'" || name == "p_" + coordinate.name)
                 fail(fmt::format("{} is of the time, which a clock counts from 0; it cannot be varied", name));
             continue;

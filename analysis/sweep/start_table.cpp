@@ -11,7 +11,6 @@
 #include <stdexcept>
 
 #include "analysis/sweep/axis.hpp"
-#include "generator/scene/time_coordinate.hpp"
 #include "runtime/build/sha256.hpp"
 #include "runtime/files/cells.hpp"
 #include "runtime/files/npy.hpp"
@@ -94,7 +93,7 @@ void read_npy_starts(const Scene& scene, const std::string& bytes, StartTable& t
     table.columns = std::move(array.columns);
     table.names = std::move(array.names);
     if (!table.names.empty()) return;
-    const std::size_t n = scene.coordinates.size() - (has_time_coordinate(scene) ? 1 : 0), width = table.columns.size();
+    const std::size_t n = scene.coordinates.size() - (scene.has_time_coordinate() ? 1 : 0), width = table.columns.size();
     const bool has_velocities = scene.start == Start::velocity;
     if (array.shape.size() != 2 || (width != n && width != 2 * n))
         fail(

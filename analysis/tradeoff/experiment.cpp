@@ -146,7 +146,7 @@ Experiment::Experiment(const Scene& written, const Scene& scene, ExperimentReque
 double Experiment::rate_at(StepClock clock, const std::vector<GiNaC::ex>& positions, double time) const {
     const Scene& clocked = kernels_.derivation(clock).scene;
     GiNaC::exmap values;
-    if (has_time_coordinate(clocked)) values[clocked.coordinates.back().position] = time;
+    if (clocked.has_time_coordinate()) values[clocked.coordinates.back().position] = time;
     for (std::size_t k = 0; k < positions.size(); ++k) values[clocked.coordinates[k].position] = positions[k];
     return scene_.evaluate(clocked.clock->rate.subs(values), "the clock").to_double();
 }

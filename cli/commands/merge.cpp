@@ -193,7 +193,7 @@ void add_merge(CommandLine& program) {
     command.option("-o,--output", options->output, "Table to write: .csv, .npy or .h5, as the parts are")
         .shown_as("FILE")
         .required();
-    command.flag("--quiet", options->quiet, "Print nothing but errors");
+    command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
     command.footer(
         "Example:\n  lobatto sweep scenes/pendulum.toml --vary q=0:3:100 --until 10 --shard 1/2 -o first.npy\n"
         "  lobatto sweep scenes/pendulum.toml --vary q=0:3:100 --until 10 --shard 2/2 -o second.npy\n"

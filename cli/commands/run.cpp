@@ -79,7 +79,10 @@ TrajectoryHeader event_header_of(const Scene& scene, TrajectoryHeader header) {
     header.columns.resize(header.columns.size() - static_cast<std::size_t>(header.beside) - (header.energy ? 1 : 0));
     header.beside = 0;
     header.energy = false;
-    header.columns.insert(header.columns.begin(), {"event", ""});
+    std::string number = "event";
+    while (std::any_of(header.columns.begin(), header.columns.end(), [&](const auto& c) { return c.first == number; }))
+        number += '_';
+    header.columns.insert(header.columns.begin(), {number, ""});
     for (const Event& event : scene.reported()) header.events.push_back(event.text);
     return header;
 }
@@ -365,8 +368,7 @@ void run(const RunOptions& options) {
         print_events(scene, result, observers.counts, files.events_path());
         const double states = observers.counts[0];
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));
-        if (!run.steps.reaches_end && result.status == LOBATTO_OK && result.stop < 0)
-            fmt::print("The end time is not a multiple of the step: the run ends at the last multiple before it.\n");
+        if (const std::string end = ends_early(run, result); !end.empty()) fmt::print("{}\n", end);
     }
     fail_where_it_failed(scene, result, verdict, files);
 }

@@ -299,7 +299,7 @@ void add_sweep(CommandLine& program) {
         "Do not measure errors by companions, which take 3/2 of the sweep's time, more at short contacts and pulses");
     command.flag("--beyond-horizon", options->beyond_horizon,
                  "Trajectories of which nothing is left are no failures: for the statistics of chaos");
-    command.flag("--quiet", options->quiet, "Print nothing but errors");
+    command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
     add_json_option(command, options->json);
     command.footer(
         "Example:\n  lobatto sweep scenes/pendulum.toml --vary q=0:3:1000 --vary omega=1,2,5 --until 10 -o table.npy\n"

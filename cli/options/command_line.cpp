@@ -249,6 +249,11 @@ void CommandLine::run(int argc, char** argv) {
             if (word.starts_with("--") && word.size() > 2)
                 throw complaint("The following argument was not expected: " + word);
         throw complaint(error.what());
+    } catch (const CLI::ExtrasError&) {  // CLI11 tells them in the wrong order
+        const auto chosen = app_->get_subcommands();
+        const std::vector<std::string> words = chosen.empty() ? app_->remaining() : chosen.front()->remaining();
+        throw complaint(fmt::format("The following argument{} not expected: {}", words.size() == 1 ? " was" : "s were",
+                                    fmt::join(words, " ")));
     } catch (const CLI::ParseError& error) {
         throw complaint(error.what());
     }

@@ -57,7 +57,8 @@ void keep_scene(const std::string& scene, const std::string& path) {
 
 void require_ending(const std::string& path, const std::string& ending) {
     std::error_code none;
-    const bool is_device = std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none);
+    const bool is_device = std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none) &&
+                           !std::filesystem::is_directory(path, none);
     if (!is_standard_output(path) && !is_device && !path.ends_with(ending))
         throw InputError(fmt::format("-o: {} is no {}", path, ending));
 }

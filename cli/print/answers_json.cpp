@@ -46,6 +46,16 @@ Answer measured_of(const MeasuredError& error, const Scene& scene) {
             {"doubling", number(error.doubling)}};
 }
 
+// With what lines of text say beside them.
+std::vector<std::string> warnings_of(const PreparedRun& run, const TrajectoryResult& result,
+                                     const RunVerdict& verdict) {
+    std::vector<std::string> all = verdict.warnings;
+    if (verdict.error)
+        if (const std::string part = not_measured_at_end(*verdict.error); !part.empty()) all.push_back(part);
+    if (const std::string end = ends_early(run, result); !end.empty()) all.push_back(end);
+    return all;
+}
+
 }  // namespace
 
 std::string json_of_run(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
@@ -63,7 +73,7 @@ std::string json_of_run(const PreparedRun& run, const TrajectoryRequest& request
          {"method", scene.method.name()},
          {"ending", ending_of(result, verdict)},
          {"failure", verdict.failure.empty() ? Answer(nullptr) : Answer(verdict.failure)},
-         {"warnings", verdict.warnings},
+         {"warnings", warnings_of(run, result, verdict)},
          {"steps", steps},
          {"step", number(request.step)},
          {"time", number(result.time)},

@@ -166,16 +166,19 @@ void add_curves(Viewed& viewed, const Scene& scene, Channels& channels) {
         viewed.charts.push_back({"", {plot.text}});
     }
     const Coordinate& first = scene.coordinates.front();
-    motion.curves.push_back({"phase", fmt::format("p_{0} over {0}", first.name),
+    // No coordinate and no formula has a name like these.
+    const std::string name = "phase portrait:";
+    motion.curves.push_back({name, fmt::format("p_{0} over {0}", first.name),
                              channels.of(scene.outputs.momenta_of_kept.front()), false, channels.of(first.position)});
-    viewed.charts.push_back({"phase portrait", {"phase"}, true});
+    viewed.charts.push_back({"phase portrait", {name}, true});
 }
 
 // `change`: of motions that conserve it.
 void add_energy(Viewed& viewed, const Scene& scene, Channels& channels, const std::optional<GiNaC::ex>& change) {
+    const std::string name = "energy:";
     viewed.motion.curves.push_back(
-        {"energy", change ? "H - H(0)" : "H", channels.of(change.value_or(scene.outputs.energy_of_kept))});
-    viewed.charts.push_back({change ? "energy error" : "energy", {"energy"}});
+        {name, change ? "H - H(0)" : "H", channels.of(change.value_or(scene.outputs.energy_of_kept))});
+    viewed.charts.push_back({change ? "energy error" : "energy", {name}});
 }
 
 // What a run keeps so that it looks smooth: states between steps, or arrivals of a clock.
@@ -232,8 +235,8 @@ bool is_too_fast(const Scene& scene, const std::vector<std::vector<double>>& fra
             missed += std::fabs(q - before[first + k] - way);
             turned += std::fabs(way);
         }
-        if (high - low <= rests * std::fmax(std::fabs(low), std::fabs(high))) continue;
-        const double steps = static_cast<double>(frames.size() - 1);
+        const double steps = static_cast<double>(frames.size() - 1), place = std::fmax(std::fabs(low), std::fabs(high));
+        if (high - low <= rests * place && turned <= rests * place * steps) continue;
         if (missed / steps > 0.25 * (high - low) / 2) return true;
         if (scene.coordinates[k].unit == "rad" && turned / steps > 2) return true;
     }

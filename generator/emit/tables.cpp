@@ -11,7 +11,6 @@
 #include "generator/mechanics/derivation.hpp"
 #include "generator/mechanics/structure/scaled_mass.hpp"
 #include "generator/programs/looped.hpp"
-#include "generator/scene/time_coordinate.hpp"
 
 namespace lobatto {
 
@@ -272,13 +271,13 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     if (structure.form() == Form::general)
         line(text, fmt::format("bool clocked = {}", d.scene.clock.has_value()),
              d.scene.clock ? "steps are equally long in tau, dt = clock(q) dtau" : "steps are equally long in time");
-    if (has_time_coordinate(d.scene))
+    if (d.scene.has_time_coordinate())
         line(text, fmt::format("double pace_exponent = {}", pace_exponent(d.scene.clock->rate).to_double()),
              "a; the last coordinate is the time (D64)");
     line(text, fmt::format("int parameter_count = {}", d.scene.parameters.size() - (d.scene.clock ? 1 : 0)),
-         has_time_coordinate(d.scene) ? "in the order of the scene; the one after them is sigma (D64)"
-         : d.scene.clock              ? "in the order of the scene; the one after them is the energy at the start"
-                                      : "in the order of the scene");
+         d.scene.has_time_coordinate() ? "in the order of the scene; the one after them is sigma (D64)"
+         : d.scene.clock               ? "in the order of the scene; the one after them is the energy at the start"
+                                       : "in the order of the scene");
     if (const std::size_t inputs = d.system.inputs.size(); inputs > 0) {
         const auto& all = d.scene.parameters;
         const auto first = std::find_if(all.begin(), all.end(), [](const Parameter& one) { return one.is_input; });

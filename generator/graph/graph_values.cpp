@@ -201,9 +201,11 @@ std::pair<GiNaC::ex, GiNaC::ex> base_and_exponent(const GiNaC::ex& factor) {
 // GiNaC takes numbers in and out of sums in an order that differs from process to process, so that -2 may be -2.000...
 cln::cl_R exact_where_it_is(const cln::cl_R& x) {
     if (is_rational(x)) return x;
-    constexpr long largest = 1000000;  // of such a fraction: all large numbers of many digits are whole
+    // A float longer than its digits is always whole, which says nothing.
+    static const cln::cl_I longest = cln::expt_pos(cln::cl_I(10), 20);
+    constexpr long largest = 1000000;
     const cln::cl_RA near = cln::rationalize(x);
-    return cln::denominator(near) < largest && cln::abs(cln::numerator(near)) < largest ? near : x;
+    return cln::denominator(near) < largest && cln::abs(cln::numerator(near)) < longest ? near : x;
 }
 
 // About log2 |x|.
@@ -226,11 +228,12 @@ std::pair<double, double> bits_of_terms(const GiNaC::ex& sum) {
 
 // GiNaC takes (1 - x^2/1.234567^2)^30 for (1524155677489 - 10^12 x^2)^30/1524155677489^30: numbers that no number type
 // holds, though their product is of order 1. For each factor, the power of two by which its terms are multiplied, so
-// that the number in front of the product comes near to 1, and the least one in the sum. That changes no rounding.
+// that the number in front of the product comes near to 1, and the least one in the sum, unless that takes the one in
+// front away from 1. That changes no rounding.
 // Empty: nothing is so large.
 std::vector<int> scales_of(const GiNaC::exvector& factors) {
     constexpr double large = 64;  // bits
-    double front = 0, inside = 0, most = 0;
+    double front = 0, inside = 0, most = 0, least_inside = 0;
     std::vector<std::pair<double, double>> bits(factors.size());
     for (std::size_t i = 0; i < factors.size(); ++i) {
         const auto [base, exponent] = base_and_exponent(factors[i]);
@@ -240,14 +243,17 @@ std::vector<int> scales_of(const GiNaC::exvector& factors) {
             const double n = GiNaC::ex_to<GiNaC::numeric>(exponent).to_double();
             bits[i] = bits_of_terms(base);
             inside += bits[i].second * n;
+            least_inside += bits[i].first * n;
             most = std::fmax(most, bits[i].first * std::fabs(n));
         }
     }
     if (std::fabs(front) <= large && most <= large) return {};
     const double part = inside == 0 || std::fabs(front) <= large ? 0 : std::clamp(-front / inside, 0.0, 1.0);
+    const bool takes_least = std::fabs(front + least_inside) <= std::fmax(std::fabs(front), large);
+    if (!takes_least && part == 0) return {};
     std::vector<int> scales;
     for (const auto& [least, largest] : bits)
-        scales.push_back(-static_cast<int>(std::lround(std::fmax(least, part * largest))));
+        scales.push_back(-static_cast<int>(std::lround(std::fmax(takes_least ? least : 0, part * largest))));
     return scales;
 }
 

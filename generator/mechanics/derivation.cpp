@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "generator/formula/limits.hpp"
-#include "generator/scene/time_coordinate.hpp"
 
 namespace lobatto {
 
@@ -26,7 +25,7 @@ bool conserves_energy(const Scene& scene, const SystemOutline& system) {
     const auto gives_all_back = [&](const Impact& impact) {
         return impact.reset_position.empty() && impact.restitution.is_equal(1) && !impact.when.value.has(system.t);
     };
-    return !changes_with_time(scene, system) && !system.has_forces() && !has_time_coordinate(scene) &&
+    return !changes_with_time(scene, system) && !system.has_forces() && !scene.has_time_coordinate() &&
            std::all_of(scene.impacts.begin(), scene.impacts.end(), gives_all_back);
 }
 

@@ -5,7 +5,6 @@
 #include "generator/mechanics/structure/scaled_mass.hpp"
 #include "generator/programs/builder.hpp"
 #include "generator/programs/identifier.hpp"
-#include "generator/scene/time_coordinate.hpp"
 
 namespace lobatto {
 
@@ -232,7 +231,7 @@ private:
     Id energy() {
         const std::vector<ex> terms =
             d_.scene.clock ? terms_of(d_.scene.clock->lagrangian, motion_symbols()) : d_.system.terms;
-        const std::size_t moving = n_ - (has_time_coordinate(d_.scene) ? 1 : 0);
+        const std::size_t moving = n_ - (d_.scene.has_time_coordinate() ? 1 : 0);
         std::vector<ex> radial;  // v . d(term)/dv
         for (const ex& term : terms) {
             const std::vector<ex> slopes = gradient_of({term}, d_.system.v);

@@ -217,6 +217,7 @@ struct Scene {
     Run run;
     Outputs outputs;
 
+    bool has_time_coordinate() const { return clock && clock->has_time_coordinate; }
     std::vector<GiNaC::symbol> inputs() const;
 
     // All that a kernel looks for in each step: events, then stops, impacts, switches.

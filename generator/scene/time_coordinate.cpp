@@ -35,7 +35,7 @@ void add_time_coordinate(Scene& scene) {
 }
 
 Scene without_time_coordinate(Scene scene) {
-    if (!has_time_coordinate(scene)) return scene;
+    if (!scene.has_time_coordinate()) return scene;
     scene.coordinates.pop_back();
     scene.initial_position.pop_back();
     scene.initial_rate.pop_back();

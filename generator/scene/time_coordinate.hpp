@@ -10,12 +10,7 @@ namespace lobatto {
 // minus the energy, beside the other coordinates.
 bool needs_time_coordinate(const Scene& scene);
 
-// Whether it is there: as the last one.
-inline bool has_time_coordinate(const Scene& scene) {
-    return scene.clock && scene.clock->has_time_coordinate;
-}
-
-// With it, where a clock needs it; formulas of the scene go on holding `time`. And without it.
+// With it as the last one, where a clock needs it; formulas of the scene go on holding `time`. And without it.
 void add_time_coordinate(Scene& scene);
 Scene without_time_coordinate(Scene scene);
 

@@ -11,7 +11,6 @@
 #include "analysis/motion.hpp"
 #include "generator/mechanics/clock/automatic_clock.hpp"
 #include "generator/pipeline.hpp"
-#include "generator/scene/time_coordinate.hpp"
 #include "runtime/measure/diagnostics.hpp"
 #include "tests/support.hpp"
 #include "tests/trajectory_table.hpp"
@@ -108,7 +107,7 @@ TEST_CASE("a clock follows a motion with forces, whose power its energy takes") 
 
 TEST_CASE("an automatic clock follows poles that move") {
     const Scene scene = with_automatic_clock(scene_of(moving_centre("points = 9", 0.4 * std::pow(1 - e, 1.5), 31.4)));
-    REQUIRE(has_time_coordinate(scene));
+    REQUIRE(scene.has_time_coordinate());
     const TrajectoryResult result = run(scene);
     CHECK(result.chain_steps < 4200);
     CHECK(error_of(result, 31.4, true) < 1e-10);

@@ -92,6 +92,10 @@ TEST_CASE("a Lagrangian that jumps has no motion there, and a run says so") {
     std::string tiny = jumping("(x'/1e-3)^2/2 - (x/1e-3)^4/4 - 0.001*if(x/1e-3 > 0, 1, 0)");
     tiny.replace(tiny.find("-1, velocity = 0.1"), 18, "-1e-3, velocity = 1e-4");
     CHECK(run(tiny).err.find("the Lagrangian jumps") != std::string::npos);
+    // Wherever the origin is.
+    std::string far = jumping("x'^2/2 - 0.01*if(x > 990, 1, 0)");
+    far.replace(far.find("-1, velocity = 0.1"), 18, "1000, velocity = -1");
+    CHECK(run(far).err.find("the Lagrangian jumps") != std::string::npos);
 }
 
 TEST_CASE("a momentum that is a difference at rest has its velocity where the motion turns") {

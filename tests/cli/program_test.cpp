@@ -114,6 +114,8 @@ TEST_CASE("a misspelt option is told with the nearest one") {
     const Answer run = shell(program + " run scenes/pendulum.toml --untl 3");
     CHECK(run.code == 2);
     CHECK(run.text.find(". Did you mean '--until'?") != std::string::npos);
+    CHECK(shell(program + " stability scenes/pendulum.toml --untl 0").text.find("not expected: --untl 0") !=
+          std::string::npos);
 }
 
 TEST_CASE("completions know commands, options and words; manual pages say what the helps say") {

@@ -197,6 +197,14 @@ TEST_CASE("there is no tangent of a step that a wall cuts, and names of elements
                                   "cuts the step from here"));
 }
 
+TEST_CASE("a step with a clock ends at a time of its own, so it has no tangent at one") {
+    lob::Settings settings;
+    settings.clock = "auto";
+    const lob::Stepper stepper(lob::compile(lob::Scene(LOBATTO_SOURCE_DIR "/scenes/kepler.toml"), settings));
+    CHECK(lobatto::test::contains(lobatto::test::message_of<lob::InputError>([&] { stepper.tangent(); }),
+                                  "tangent: with a clock a step lasts as long as the motion makes it"));
+}
+
 TEST_CASE("the tangent of a step is symplectic") {
     lob::Stepper stepper(lob::compile(lob::Scene(scenes + "pendulum.toml")));
     const std::vector<double> T = stepper.tangent();

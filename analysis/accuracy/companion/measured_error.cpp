@@ -26,4 +26,12 @@ std::string text_of(const MeasuredError& error, const Scene& scene) {
     return text + chaos;
 }
 
+std::string not_measured_at_end(const MeasuredError& error) {
+    if (error.complete || error.is_lost() || !error.is_known_at_end()) return "";  // or others say so
+    return fmt::format(
+        "the error was measured only to t = {:.4g}, where it is {:.1e} of the amplitude; that at the end "
+        "is extrapolated",
+        error.until, error.end);
+}
+
 }  // namespace lobatto

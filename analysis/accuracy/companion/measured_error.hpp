@@ -36,5 +36,7 @@ struct MeasuredError {
 
 // One line.
 std::string text_of(const MeasuredError& error, const Scene& scene);
+// Where `at_end` is no measurement, that it is none; for those who do not read that line. Empty: it is one.
+std::string not_measured_at_end(const MeasuredError& error);
 
 }  // namespace lobatto

@@ -31,13 +31,14 @@ public:
         const std::size_t n = scene.coordinates.size();
         for (std::size_t k = 0; k < n; ++k) {
             const double q = size_of(scene.initial_position[k]),
-                         v = scene.start == Start::velocity ? size_of(scene.initial_rate[k]) : 0,
-                         size = std::fmax(q, v);
-            sizes_[parameters_ + k] = sizes_[parameters_ + n + k] = size > 0 ? size : 1;
+                         v = scene.start == Start::velocity ? size_of(scene.initial_rate[k]) : 0;
+            // A large position says nothing of velocities: the origin may be far away.
+            sizes_[parameters_ + k] = std::fmax(q, v) > 0 ? std::fmax(q, v) : 1;
+            sizes_[parameters_ + n + k] = v > 0 ? v : sizes_[parameters_ + k];
         }
     }
 
-    // The median jump where u = 0, and the size of the pieces there; nothing where that is not known.
+    // The median jump where u = 0, and the size of the pieces; nothing where that is not known.
     std::optional<std::pair<double, double>> of(const Switch& one) {
         const auto piece = [&](int side) {
             return Tape::of(scene_.along_motion(scene_.lagrangian.subs(one.side == side)), symbols_);
@@ -50,10 +51,14 @@ public:
         std::vector<std::pair<double, double>> found;
         for (int place = 0; place < tried_places; ++place) {
             for (std::size_t i = parameters_; i < variables_.size(); ++i) variables_[i] = sizes_[i] * random();
+            // Pieces may be small where they meet: as large as anywhere.
+            const double elsewhere = std::fmax(std::fabs((*above)(variables_)), std::fabs((*below)(variables_)));
             const double rate = (*slope)(variables_);
             variables_[k] -= (*u)(variables_) / rate;
             const double a = (*above)(variables_), b = (*below)(variables_), jump = std::fabs(a - b);
-            if (std::isfinite(jump)) found.emplace_back(jump, std::fmax(std::fabs(a), std::fabs(b)));
+            const double size = std::fmax(std::fabs(a), std::fabs(b));
+            if (std::isfinite(jump))
+                found.emplace_back(jump, std::isfinite(elsewhere) ? std::fmax(size, elsewhere) : size);
         }
         if (found.size() < tried_places / 2) return std::nullopt;
         std::sort(found.begin(), found.end());

@@ -10,7 +10,6 @@
 #include <stdexcept>
 
 #include "generator/mechanics/clock/automatic_clock.hpp"
-#include "generator/mechanics/start.hpp"
 #include "generator/mechanics/system/system.hpp"
 #include "generator/scene/time_coordinate.hpp"
 
@@ -48,14 +47,14 @@ class Transformation {
 public:
     explicit Transformation(const Scene& scene) : scene_(scene), g_(clock_rate(scene)) {
         const Coordinate& last = scene.coordinates.back();
-        if (has_time_coordinate(scene)) {
+        if (scene.has_time_coordinate()) {
             moment_ = {{scene.time, last.position}};
             g_ = g_.subs(moment_);
         }
-        pace_ = has_time_coordinate(scene) ? ex(last.velocity) : g_;
+        pace_ = scene.has_time_coordinate() ? ex(last.velocity) : g_;
         slower_ = moment_;
         for (const Coordinate& coordinate : scene.coordinates) {
-            if (has_time_coordinate(scene) && &coordinate == &last) continue;
+            if (scene.has_time_coordinate() && &coordinate == &last) continue;
             q_.push_back(coordinate.position);
             v_.push_back(coordinate.velocity);
             slower_[coordinate.velocity] = coordinate.velocity / pace_;
@@ -85,9 +84,9 @@ public:
             else
                 action += pace_ * slow;
         }
-        if (!has_time_coordinate(scene_)) of_degree[0] += clock.energy;
+        if (!scene_.has_time_coordinate()) of_degree[0] += clock.energy;
         for (const auto& [degree, sum] : of_degree) action += sum * GiNaC::pow(pace_, 1 - degree);
-        if (has_time_coordinate(scene_)) {
+        if (scene_.has_time_coordinate()) {
             action += kept_pace(clock.energy);
             transform_forces(result);
         }
@@ -101,7 +100,7 @@ public:
         }
         const std::string name = clock.energy.get_name();
         result.parameters.push_back({name, "", number_of_start(), clock.energy, name});
-        if (has_time_coordinate(scene_)) result.start = Start::velocity;
+        if (scene_.has_time_coordinate()) result.start = Start::velocity;
         if (result.start == Start::velocity)
             for (std::size_t k = 0; k < rates_.size(); ++k) result.initial_rate[k] = rates_[k] * at_start(g_);
         return result;
@@ -113,16 +112,46 @@ private:
     void set_rates() {
         if (scene_.start == Start::velocity) {
             rates_ = scene_.initial_rate;
-        } else if (has_time_coordinate(scene_)) {
-            Scene in_time = without_time_coordinate(scene_);
-            in_time.clock.reset();
-            for (const cln::cl_R& v : start_on_constraints(in_time, build_system(in_time)).v)
-                rates_.emplace_back(GiNaC::numeric(v));
+        } else if (scene_.has_time_coordinate()) {
+            rates_.assign(v_.size(), 0);
             rates_.emplace_back(1);
+            find_velocities();
         } else {
             rates_.assign(scene_.coordinates.size(), 0);
         }
     }
+    // Newton's method for dL/dv = p, from rest.
+    void find_velocities() {
+        constexpr int most_iterations = 50;
+        const std::vector<ex> momentum = gradient_of(terms_of(scene_.lagrangian, motion_), v_);
+        const SparseMatrix slopes = derivative_of(momentum, v_);
+        const auto n = static_cast<unsigned>(v_.size());
+        const GiNaC::numeric rounding = GiNaC::numeric(10).power(-30);  // of 60 digits half, and then all
+        for (int iteration = 0; iteration < most_iterations; ++iteration) {
+            GiNaC::matrix mass(n, n), unknown(n, 1), missing(n, 1);
+            for (const auto& [place, value] : slopes.entries())
+                mass(static_cast<unsigned>(place.first), static_cast<unsigned>(place.second)) = at_start(value);
+            for (unsigned k = 0; k < n; ++k) {
+                unknown(k, 0) = v_[k];
+                missing(k, 0) = scene_.value_of(scene_.initial_rate[k]) - at_start(momentum[k]);
+            }
+            GiNaC::matrix step;
+            try {
+                step = mass.solve(unknown, missing);
+            } catch (const std::runtime_error&) {
+                break;
+            }
+            GiNaC::numeric length = 0, size = 0;
+            for (unsigned k = 0; k < n; ++k) {
+                rates_[k] += step(k, 0);
+                length += GiNaC::abs(GiNaC::ex_to<GiNaC::numeric>(step(k, 0)));
+                size += GiNaC::abs(GiNaC::ex_to<GiNaC::numeric>(rates_[k]));
+            }
+            if (length <= rounding * size) return;
+        }
+        fail_at_clock(scene_, "no velocity was found that has the momentum at the start; give velocities");
+    }
+
     void require_positive_rate() const {
         const GiNaC::numeric rate = at_start(g_);
         if (!rate.is_positive())
@@ -159,7 +188,7 @@ private:
         const std::vector<ex> momentum = gradient_of(terms_of(scene_.lagrangian, motion_), v_);
         for (std::size_t k = 0; k < v_.size(); ++k) moving += at_start(v_[k] * momentum[k]);
         const GiNaC::numeric energy = moving - at_start(scene_.lagrangian);
-        if (!has_time_coordinate(scene_)) return energy;
+        if (!scene_.has_time_coordinate()) return energy;
         const GiNaC::numeric size = GiNaC::abs(moving / 2) + GiNaC::abs(energy - moving / 2);
         return size.is_zero() ? GiNaC::numeric(1) : size / 2 * at_start(power_of(g_, 1 - pace_exponent(g_)));
     }

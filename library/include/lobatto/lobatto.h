@@ -109,7 +109,7 @@ LOBATTO_C_API int lobatto_integrator_set_inputs(lobatto_integrator* integrator, 
 LOBATTO_C_API int lobatto_integrator_velocity(lobatto_integrator* integrator, double* velocity); /* n */
 /* Position and velocity at a time inside the last step, n each. */
 LOBATTO_C_API int lobatto_integrator_at(lobatto_integrator* integrator, double t, double* q, double* velocity);
-/* One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The motion stays where it is. */
+/* One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The motion stays where it is. Not with a clock. */
 LOBATTO_C_API int lobatto_integrator_tangent(lobatto_integrator* integrator, double* tangent);
 LOBATTO_C_API int lobatto_integrator_parameter(lobatto_integrator* integrator, const char* parameter, double* value);
 /* What was met since the last call: *count events, until the next call. */

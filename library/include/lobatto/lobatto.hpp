@@ -209,9 +209,9 @@ public:
     std::vector<double> multipliers() const;  ///< of the constraints, here
     /// Position and velocity inside the last step, on its own polynomial: t - step_size() <= t <= t().
     std::pair<std::vector<double>, std::vector<double>> at(double t) const;
-    /// One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The trajectory stays where it is. With a
-    /// clock the derivative is that of a step of the clock, at the energy of this state. ComputationError where a wall
-    /// or a switch cuts the step.
+    /// One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The trajectory stays where it is. InputError
+    /// with a clock, whose steps last as long as the motion makes them; ComputationError where a wall or a switch cuts
+    /// the step.
     std::vector<double> tangent() const;
 
     /// A parameter or an input, from the next step on. Another parameter prepares the kernel anew; what controls a

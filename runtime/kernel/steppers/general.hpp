@@ -320,7 +320,8 @@ private:
             for (int i = 0; i < r; ++i) {
                 this->node_variables(q, p, a.Y, i, a.z);
                 for (int b = 0; b < active; ++b) Q[K::active_index[b]] = a.z[active + b];
-                rates[i] = HasTimeCoordinate<K>::value ? a.z[active - 1] : Formulas<K>::clock(coefficients, this->time(), Q);
+                rates[i] =
+                    HasTimeCoordinate<K>::value ? a.z[active - 1] : Formulas<K>::clock(coefficients, this->time(), Q);
                 passed += K::b[i] * rates[i];
             }
         }

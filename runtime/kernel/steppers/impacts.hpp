@@ -237,13 +237,14 @@ struct Sides {
 // state. Refused values change nothing.
 template <class K>
 Status set_watched_inputs(WatchedStepper<K>& stepper, typename K::Parameters values) {
-    const WatchedStepper<K> before = stepper;
+    const auto* const before = new WatchedStepper<K>(stepper);  // of megabytes, in large systems
     for (int i = K::first_input; i < K::first_input + K::inputs; ++i)
         K::parameter(stepper.parameters, i) = K::parameter(values, i);
     Status status = set_inputs(stepper, stepper.parameters);
     if constexpr (WatchedStepper<K>::walls > 0)
         if (status == Status::ok) status = Sides<K>::take_again(stepper);
-    if (status != Status::ok) stepper = before;
+    if (status != Status::ok) stepper = *before;
+    delete before;
     return status;
 }
 

@@ -95,6 +95,10 @@ TEST_CASE("powers of sums keep the size that they are written with") {
     Inputs g;
     const Id id = g.graph.from(3 * GiNaC::pow(1 + 1000000 * x, 64), {{x, g.x}});
     CHECK(g.text(id) == "3*(1000000*x + 1)^64");
+    // Nor does the number in front become one that no double holds, where it is 1 without that.
+    const GiNaC::numeric small(1, 100000000000000);
+    CHECK(g.text(g.graph.from(small * GiNaC::pow(1234567 + 2345678 * x, 60), {{x, g.x}})).find("e+3") ==
+          std::string::npos);
 }
 
 TEST_CASE("the order of terms is that of the inputs, not of construction") {
