@@ -44,8 +44,8 @@ struct StartIn {
     std::vector<real> parameters, q, p;
 };
 
-// ComputationError when the kernel cannot be prepared with these parameters and this step. A kernel may have the time as
-// one coordinate more than the scene of the start.
+// ComputationError when the kernel cannot be prepared with these parameters and this step. A kernel may have the time
+// as one coordinate more than the scene of the start.
 template <class real>
 StartIn<real> start_in(const ExactStart& start, const Kernel& kernel, real step);
 

@@ -19,10 +19,10 @@ namespace lobatto {
 
 namespace {
 
-// Of a motion that may come near a pole.
 // Energy errors, relative, that are larger than the errors of positions by so much tell that those have grown since.
 constexpr double told_by_energy = 100;
 
+// Of a motion that may come near a pole.
 std::string clock_advice(const Scene& scene) {
     const bool helps = !scene.clock && has_automatic_clock(scene);
     return helps ? ", or clock = \"auto\" under [method], whose steps follow close encounters" : "";
@@ -160,7 +160,7 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
     const Scene& scene = run.scene;
     RunVerdict verdict;
     if (observers.companion) verdict.error = observers.companion->finish(result);
-    if (verdict.error && !verdict.error->complete && run.outline.conserves_energy() &&
+    if (verdict.error && !verdict.error->complete && run.outline.conserves_energy() && result.energy_start != 0 &&
         result.energy_error_largest > told_by_energy * verdict.error->at_end * std::fabs(result.energy_start))
         verdict.error->at_end = std::nan("");
     if (observers.began_unmeasured)

@@ -71,7 +71,8 @@ void StepJudge::restore(const std::vector<double>& saved) {
     most_ = take(width);
     const std::ptrdiff_t by_hardest = std::llround(*at++);
     hardest_.restore(take(by_hardest), static_cast<std::size_t>(1 + width));
-    some_.restore(&*at, saved.data() + saved.size(), static_cast<std::size_t>(1 + width));
+    some_.restore(saved.data() + (at - saved.begin()), saved.data() + saved.size(),
+                  static_cast<std::size_t>(1 + width));
 }
 
 // Which coordinates errors alone move (rests_beside).

@@ -93,7 +93,8 @@ void read_npy_starts(const Scene& scene, const std::string& bytes, StartTable& t
     table.columns = std::move(array.columns);
     table.names = std::move(array.names);
     if (!table.names.empty()) return;
-    const std::size_t n = scene.coordinates.size() - (scene.has_time_coordinate() ? 1 : 0), width = table.columns.size();
+    const std::size_t n = scene.coordinates.size() - (scene.has_time_coordinate() ? 1 : 0),
+                      width = table.columns.size();
     const bool has_velocities = scene.start == Start::velocity;
     if (array.shape.size() != 2 || (width != n && width != 2 * n))
         fail(

@@ -112,12 +112,6 @@ bool KernelBuilder::is_ready(const Member& member) const {
     return item != items_.end() && item->second.ready;
 }
 
-std::size_t KernelBuilder::waiting() const {
-    const std::lock_guard lock(mutex_);
-    return static_cast<std::size_t>(
-        std::count_if(items_.begin(), items_.end(), [](const auto& item) { return !item.second.ready; }));
-}
-
 Kernel KernelBuilder::kernel(const Member& member) {
     order(member);
     Item& item = items_.at(member);

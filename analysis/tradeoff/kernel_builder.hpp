@@ -41,7 +41,6 @@ public:
     void order(const Member& member);
     bool is_ordered(const Member& member) const { return items_.count(member) != 0; }
     bool is_ready(const Member& member) const;  // ordered, and compiled or found in the cache, or failed
-    std::size_t waiting() const;                // ordered and not ready
     // Orders it if need be, and waits for it. Throws what compiling threw.
     Kernel kernel(const Member& member);
     double compile_seconds(const Member& member) const;  // of one that is ready; 0: found in the cache

@@ -313,7 +313,6 @@ void choose_among(Experiment& experiment, const Tried& tried, double goal, Searc
             if (finalist.seconds < 1.5 * finalists.front().seconds) finalist = experiment.time_again(finalist, 1);
     for (const Measurement& finalist : finalists)
         if (!result.best || finalist.seconds < result.best->seconds) result.best = finalist;
-    result.by_member = finalists;
 }
 
 }  // namespace

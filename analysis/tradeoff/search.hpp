@@ -31,7 +31,6 @@ struct Search {
     bool is_rounding = false;         // that is rounding
     int members = 0;                  // tried
     bool complete = false;            // no member that was not tried can be expected to win
-    std::vector<Measurement> by_member;
 };
 Search search(Experiment& experiment, double goal, Precision numbers);
 // The kernels to begin with.

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <set>
 
+#include "generator/scene/time_coordinate.hpp"
+
 namespace lobatto {
 
 namespace {
@@ -246,7 +248,7 @@ std::vector<DrawnFigure> figures_of(const Scene& scene) {
         if (figure.kind == MovingFigure::Kind::point && !drawn.still) drawn.colour = colour++;
         all.push_back(drawn);
     }
-    return all.empty() ? from_coordinates(scene) : all;
+    return all.empty() ? from_coordinates(without_time_coordinate(scene)) : all;
 }
 
 }  // namespace lobatto

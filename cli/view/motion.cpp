@@ -153,7 +153,8 @@ void add_curves(Viewed& viewed, const Scene& scene, Channels& channels) {
         motion.curves.push_back({name, label, channels.of(formula)});
     };
     if (scene.plots.empty()) {
-        for (std::size_t k = 0; k < std::min(scene.coordinates.size(), most_plotted); ++k) {
+        const std::size_t moving = scene.coordinates.size() - (scene.has_time_coordinate() ? 1 : 0);
+        for (std::size_t k = 0; k < std::min(moving, most_plotted); ++k) {
             const Coordinate& coordinate = scene.coordinates[k];
             curve(coordinate.name, with_unit(coordinate.written, coordinate.unit), coordinate.position);
             if (by_unit.count(coordinate.unit) == 0) order.push_back(coordinate.unit);

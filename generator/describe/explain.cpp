@@ -72,7 +72,10 @@ std::string kind_of(const Derivation& derivation) {
                             : "Kinetic minus potential energy, with constant masses";
     if (linear_terms && !holds_any(system.momentum_v, system.v))
         text += ", and with terms linear in the velocities, as in magnetic fields and rotating frames";
-    if (derivation.scene.clock) text += ", in the clock's time";
+    if (derivation.scene.has_time_coordinate())
+        text += ", in the clock's time, of which the time is a coordinate, because the energy changes";
+    else if (derivation.scene.clock)
+        text += ", in the clock's time";
     if (!system.autonomous) text += "; t appears explicitly";
     std::vector<int> forced;
     for (std::size_t k = 0; k < system.outer_force.size(); ++k)

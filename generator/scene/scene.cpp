@@ -168,7 +168,7 @@ private:
         clock.at = at;
         if (!scene_.inputs().empty())
             fail(at,
-                 "a clock needs a motion that keeps its energy, but inputs change it; remove the clock, or declare the "
+                 "a clock knows no inputs, which change the energy between steps; remove the clock, or declare the "
                  "inputs under [parameters]");
         if (entry.value.kind == Value::Kind::text) clock.text = collapsed(entry.value.text.value);
         clock.is_automatic = clock.text == "auto";

@@ -215,7 +215,7 @@ typedef struct lobatto_kernel {
 
 const lobatto_kernel* lobatto_kernel_table(void);
 
-/* Trajectories as lanes of a device (steppers/device_lanes.hpp). A lane is a row of words; word w of lane l is
+/* Trajectories as lanes of a device (device_lanes.hpp). A lane is a row of words; word w of lane l is
  * words[w * room + l]. On the device the pointers are its own. */
 typedef struct lobatto_device_call {
     uint64_t* words;

@@ -142,6 +142,48 @@ TEST_CASE("a start sets the time and its momentum, whatever it is given for them
     CHECK(integrate(kernel, request).q[0] == by_momentum.q[0]);
 }
 
+TEST_CASE("starts at any time, from velocities and momenta, are those of the motion there") {
+    // A field that changes: p = v + B(t) x, so a momentum belongs to a time.
+    const std::string text =
+        "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 + 0.3*cos(t)*(x*y' - y*x') + 1/sqrt(x^2 + "
+        "y^2)\"\n[coordinates]\nx = { position = 0.3, velocity = 0 }\ny = { position = 0, velocity = 1.5 }\n"
+        "[method]\npoints = 8\nclock = \"auto\"\n[run]\nstep = 0.05\nuntil = 5\n";
+    const Kernel kernel = kernel_of(emit(derive(scene_of(text))), Precision::double_);
+    LoadedStepper<double> stepper(kernel);
+    REQUIRE(stepper.prepare({}, 0.05) == LOBATTO_OK);
+    for (const double given : {0.0, 1.0, 7.0}) {  // for the time and its rate
+        const std::vector<double> p = stepper.momentum(2, {0.3, 0, given}, {0, 1.5, given});
+        CHECK(p[1] == doctest::Approx(1.5 + 0.3 * std::cos(2) * 0.3).epsilon(1e-14));
+    }
+    // Momenta of a Lagrangian that has no velocities beyond that of light, and of one without a mass at rest.
+    for (const std::string lagrangian :
+         {"-sqrt(1 - x'^2 - y'^2) + 1/sqrt(x^2 + y^2)", "x'^4/4 + y'^2/2 + 1/sqrt(x^2 + y^2)"}) {
+        INFO(lagrangian);
+        const std::string forced = "lagrangian = \"" + lagrangian +
+                                   "\"\n[coordinates]\nx = { position = 2, momentum = 0.8 }\n"
+                                   "y = { position = 0, momentum = 1.5 }\n[forces]\ny = \"-0.01*y'\"\n[method]\n"
+                                   "points = 6\n";
+        const TrajectoryResult by_clock = run(scene_of(forced + "clock = \"auto\"\n[run]\nstep = 0.05\nuntil = 1\n"));
+        const TrajectoryResult equal = run(scene_of(forced + "[run]\nstep = 0.01\nuntil = 1\n"), 100);
+        CHECK(by_clock.q[0] == doctest::Approx(equal.q[0]).epsilon(1e-10));
+        CHECK(by_clock.q[1] == doctest::Approx(equal.q[1]).epsilon(1e-10));
+    }
+}
+
+TEST_CASE("an automatic clock keeps to the places of poles whose strengths change, or turn round, in time") {
+    for (const std::string strength : {"exp(-0.01*t)", "cos(t)", "sin(t)"}) {
+        INFO(strength);
+        const std::string text =
+            "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 + " + strength +
+            "/sqrt(x^2 + y^2 + 0.01) + 1/sqrt((x - 3)^2 + y^2 + 0.01)\"\n[coordinates]\nx = { position = 0.5, velocity "
+            "= 0 }\ny = { position = 0, velocity = 1.4 }\n[method]\npoints = 8\n";
+        const TrajectoryResult by_clock = run(scene_of(text + "clock = \"auto\"\n[run]\nstep = 0.05\nuntil = 6\n"));
+        const TrajectoryResult equal = run(scene_of(text + "[run]\nstep = 0.005\nuntil = 6\n"), 1200);
+        CHECK(by_clock.q[0] == doctest::Approx(equal.q[0]).epsilon(1e-9));
+        CHECK(by_clock.q[1] == doctest::Approx(equal.q[1]).epsilon(1e-9));
+    }
+}
+
 TEST_CASE("verify proves steps in explicit time and with forces") {
     const test::TemporaryFolder folder;
     for (const bool moves : {true, false}) {
@@ -167,6 +209,14 @@ TEST_CASE("rows of a sweep in explicit time are the ends of runs; the time itsel
     const auto end = test::read_trajectory(folder / "run.csv").rows.back();
     // trajectory, a, status, steps, t, x, ... beside t, x, ...
     for (std::size_t k = 0; k < 7; ++k) CHECK(table.rows[4][4 + k] == doctest::Approx(end[k]).epsilon(1e-10));
+    // The first row of a start from momenta knows that of the time, too.
+    test::write_text(folder / "scene.toml", half_forced("points = 8\nclock = \"r^(3/2)\"", 0.4, 2, "momentum"));
+    REQUIRE(test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "p_y=4,4.3", "--every", "30", "-o",
+                       folder / "kept.csv"})
+                .exit_code == 0);
+    const auto kept = test::read_trajectory(folder / "kept.csv");
+    CHECK(kept.rows[0][4] == 0);
+    CHECK(kept.rows[0][10] == doctest::Approx(-(8.0 - 5)).epsilon(1e-12));
     for (const std::string name : {"time", "time'", "p_time"}) {
         const test::Finished refused =
             test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", name + "=0,1"});
@@ -182,7 +232,7 @@ TEST_CASE("tune takes a clock in explicit time where it is cheaper, and keeps it
     text.replace(text.find("e = 0.9"), 7, "e = 0.99");
     test::write_text(folder / "scene.toml", text);
     const test::Finished tuned =
-        test::run({LOBATTO_PROGRAM, "tune", folder / "scene.toml", "--error", "1e-8", "--budget", "60s", "--write"});
+        test::run({LOBATTO_PROGRAM, "tune", folder / "scene.toml", "--error", "1e-6", "--budget", "60s", "--write"});
     INFO(tuned.out << tuned.err);
     REQUIRE(tuned.exit_code == 0);
     CHECK(tuned.out.find("clock = \"auto\"") != std::string::npos);
@@ -190,6 +240,6 @@ TEST_CASE("tune takes a clock in explicit time where it is cheaper, and keeps it
     const auto end = test::read_trajectory(folder / "run.csv").rows.back();
     const std::vector<double> at = ellipse(end[0], 0.99);
     const double shift = u * end[0] + a * end[0] * end[0] / 2;
-    CHECK(std::fabs(end[1] - shift - at[0]) < 2e-7 * (shift + 2));
-    CHECK(std::fabs(end[2] - at[1]) < 2e-7);
+    CHECK(std::fabs(end[1] - shift - at[0]) < 2e-6 * (shift + 2));
+    CHECK(std::fabs(end[2] - at[1]) < 2e-6);
 }

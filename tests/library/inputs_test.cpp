@@ -250,7 +250,7 @@ TEST_CASE("inputs stand where formulas of the motion are, and errors say where n
     CHECK(with("+ u*q", "") == "inputs.toml:5:1: input u occurs in no formula; use it or remove it");
     CHECK(with("u = 0.5", "u = { value = 0.5, constant = true }").starts_with("inputs.toml:5:20: unknown key"));
     CHECK(error_of(scene_of("q'^2/2 - q^2/2 + u*q", "[method]\nclock = \"1 + q^2\"")) ==
-          "inputs.toml:10:9: a clock needs a motion that keeps its energy, but inputs change it; remove the clock, or "
+          "inputs.toml:10:9: a clock knows no inputs, which change the energy between steps; remove the clock, or "
           "declare the inputs under [parameters]");
     CHECK(error_of("lagrangian = \"q'^2/2 + d*q\"\n[definitions]\nd = \"2*u\"\n[coordinates]\nq = { position = \"d\", "
                    "velocity = 0 }\n[inputs]\nu = 0\n[run]\nstep = 1\nuntil = 1\n") ==

@@ -113,9 +113,8 @@ Companion::Segment Companion::segment(std::size_t number) const {
     Segment result;
     result.begin = static_cast<std::int64_t>(number) * stride_;
     result.steps = std::min(stride_, request_.steps - result.begin);
-    result.taken = is_clocked() ? result.steps : result.steps > 0 ? companion_steps(result.steps) : 0;
-    if (is_driven_ && !is_clocked() && result.steps < fewest_driven_steps)
-        result.taken = companion_steps(fewest_driven_steps);
+    const std::int64_t steps = is_driven_ ? std::max(result.steps, fewest_driven_steps) : result.steps;
+    result.taken = is_clocked() ? result.steps : steps > 0 ? companion_steps(steps) : 0;
     return result;
 }
 

@@ -125,8 +125,8 @@ private:
     std::vector<double> parameters_;
     std::vector<double> knots_;  // of measured values in time, at which its steps end
     std::int64_t looked_ = 0;    // at terms, along steps of the companion
-    bool is_driven_ = false;     // explicit time
-    ShortContacts contacts_;     // likewise
+    bool is_driven_ = false;     // explicit time, without a clock
+    ShortContacts contacts_;     // which the steps of the run may miss, too
     Range way_;                  // since the last comparison
     std::int64_t stride_;        // steps of the run between comparisons
     std::int64_t seen_ = 0;

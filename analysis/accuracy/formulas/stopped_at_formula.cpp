@@ -118,7 +118,8 @@ std::string escape_of(const Scene& scene, const std::vector<double>& velocity, c
     variables.insert(variables.end(), result.q.begin(), result.q.end());
     const double lasts = std::fabs(request.step) * (*rate)(variables);
     double speed = 0, distance = 0, at_start = 0, outwards = 0;
-    for (std::size_t k = 0; k < velocity.size(); ++k) {
+    const std::size_t moving = velocity.size() - (scene.has_time_coordinate() ? 1 : 0);
+    for (std::size_t k = 0; k < moving; ++k) {
         speed = std::hypot(speed, velocity[k]);
         distance = std::hypot(distance, result.q[k]);
         at_start = std::hypot(at_start, request.q[k]);

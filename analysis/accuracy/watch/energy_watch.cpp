@@ -24,7 +24,7 @@ constexpr double a_rounding = 0x1p-52;   // of what the energy is computed from:
 struct State {
     double time;
     std::vector<double> q, p, v;  // v is empty where momenta determine none
-    std::vector<double> v_later;  // what the force of a step makes of it: at turning points v tells nothing
+    std::vector<double> v_later;  // about what the force of a step makes of it: at turning points v tells nothing
 };
 State state_of(const LoadedStepper<double>& stepper, const std::vector<double>& row, double step) {
     const auto middle = row.begin() + 1 + std::ssize(row) / 2;
@@ -145,7 +145,7 @@ void EnergyWatch::restore(const std::vector<double>& saved) {
     const auto leaving = static_cast<std::size_t>(std::llround(*at++));
     for (; leaving_.size() < leaving; at += static_cast<std::ptrdiff_t>(columns_))
         leaving_.emplace_back(at, at + static_cast<std::ptrdiff_t>(columns_));
-    some_.restore(&*at, saved.data() + saved.size(), columns_);
+    some_.restore(saved.data() + (at - saved.begin()), saved.data() + saved.size(), columns_);
 }
 
 EnergyWatch::States EnergyWatch::rows_of_some() const {

@@ -50,15 +50,16 @@ struct Pole {
 };
 
 // Of a term; nothing where it has none. A numerator may change its sign, where a clock would stop: r^d stands for one
-// of degree d.
-std::optional<Pole> pole_of(const ex& term, const Symbols& positions) {
+// of degree d. So may a factor that holds the time alone: it counts as at the start, or as 1.
+std::optional<Pole> pole_of(const ex& term, const Symbols& positions, const GiNaC::symbol& time) {
     GiNaC::numeric largest = 0, above = 0;
     ex constant = 1, numerator = 1, denominator = 1;
     const auto look = [&](const ex& factor) {
         const bool is_power = GiNaC::is_a<GiNaC::power>(factor) && GiNaC::is_a<GiNaC::numeric>(factor.op(1));
         const GiNaC::numeric exponent = is_power ? GiNaC::ex_to<GiNaC::numeric>(factor.op(1)) : 1;
         if (!holds(factor, positions)) {
-            constant *= factor;
+            const ex at_start = factor.subs(time == 0);
+            constant *= at_start.is_zero() ? ex(1) : at_start;
         } else if (exponent.is_negative()) {
             denominator *= factor;
             largest = std::max(largest, -exponent * degree_of(factor.op(0), positions));
@@ -73,7 +74,8 @@ std::optional<Pole> pole_of(const ex& term, const Symbols& positions) {
         look(term);
     const GiNaC::numeric degree = largest - above;
     if (!degree.is_positive()) return std::nullopt;
-    return Pole{numerator.is_equal(1) ? term : constant * GiNaC::pow(denominator, degree / largest), degree};
+    return Pole{constant * (numerator.is_equal(1) ? denominator : ex(GiNaC::pow(denominator, degree / largest))),
+                degree};
 }
 
 // The terms of L that have one, without velocities; the least degree.
@@ -91,7 +93,7 @@ Poles poles_of(const Scene& scene) {
     motion.insert(motion.end(), velocities.begin(), velocities.end());
     Poles poles;
     for (const ex& term : terms_of(scene.lagrangian, motion)) {
-        const auto pole = holds(term, velocities) ? std::nullopt : pole_of(term, positions);
+        const auto pole = holds(term, velocities) ? std::nullopt : pole_of(term, positions, scene.time);
         if (!pole) continue;
         if (!poles.least || pole->degree < *poles.least) poles.least = pole->degree;
         poles.terms.push_back(pole->term);

@@ -120,36 +120,77 @@ private:
             rates_.assign(scene_.coordinates.size(), 0);
         }
     }
-    // Newton's method for dL/dv = p, from rest.
+    // Of velocities: what is missing to the momenta of the start, and the sum of its squares; nothing where they have
+    // none.
+    struct Missing {
+        std::vector<GiNaC::numeric> momentum;
+        GiNaC::numeric squares = 0;
+    };
+    std::optional<Missing> missing(const std::vector<ex>& momentum, const std::vector<ex>& rates) const {
+        Missing result;
+        try {
+            for (std::size_t k = 0; k < v_.size(); ++k) {
+                result.momentum.push_back(scene_.value_of(scene_.initial_rate[k]) -
+                                          scene_.value_at_start(momentum[k], rates));
+                result.squares += result.momentum[k] * result.momentum[k];
+            }
+        } catch (const std::domain_error&) {
+            return std::nullopt;
+        }
+        return result;
+    }
+    // Newton's method for dL/dv = p, its steps halved while they lead away; from rest, or from a multiple of the
+    // momentum.
     void find_velocities() {
-        constexpr int most_iterations = 50;
         const std::vector<ex> momentum = gradient_of(terms_of(scene_.lagrangian, motion_), v_);
         const SparseMatrix slopes = derivative_of(momentum, v_);
-        const auto n = static_cast<unsigned>(v_.size());
+        for (int exponent = 20; exponent >= -20; --exponent) {
+            if (approach(momentum, slopes)) return;
+            for (std::size_t k = 0; k < v_.size(); ++k)
+                rates_[k] = scene_.value_of(scene_.initial_rate[k]) * GiNaC::numeric(2).power(exponent);
+        }
+        fail_at_clock(scene_, "no velocity was found that has the momentum at the start; give velocities");
+    }
+    bool approach(const std::vector<ex>& momentum, const SparseMatrix& slopes) {
+        constexpr int most_iterations = 60, most_halvings = 30;
         const GiNaC::numeric rounding = GiNaC::numeric(10).power(-30);  // of 60 digits half, and then all
-        for (int iteration = 0; iteration < most_iterations; ++iteration) {
-            GiNaC::matrix mass(n, n), unknown(n, 1), missing(n, 1);
-            for (const auto& [place, value] : slopes.entries())
-                mass(static_cast<unsigned>(place.first), static_cast<unsigned>(place.second)) = at_start(value);
-            for (unsigned k = 0; k < n; ++k) {
-                unknown(k, 0) = v_[k];
-                missing(k, 0) = scene_.value_of(scene_.initial_rate[k]) - at_start(momentum[k]);
-            }
-            GiNaC::matrix step;
+        const auto n = static_cast<unsigned>(v_.size());
+        std::optional<Missing> here = missing(momentum, rates_);
+        GiNaC::numeric wanted = 0;
+        for (std::size_t k = 0; k < v_.size(); ++k) wanted += scene_.value_of(scene_.initial_rate[k]).power(2);
+        for (int iteration = 0; here && iteration < most_iterations; ++iteration) {
+            GiNaC::matrix mass(n, n), unknown(n, 1), right(n, 1), step;
             try {
-                step = mass.solve(unknown, missing);
-            } catch (const std::runtime_error&) {
-                break;
+                for (const auto& [place, value] : slopes.entries())
+                    mass(static_cast<unsigned>(place.first), static_cast<unsigned>(place.second)) = at_start(value);
+                for (unsigned k = 0; k < n; ++k) {
+                    unknown(k, 0) = v_[k];
+                    right(k, 0) = here->momentum[k];
+                }
+                step = mass.solve(unknown, right);
+            } catch (const std::exception&) {  // of a singular matrix, or where it has no value
+                return false;
             }
             GiNaC::numeric length = 0, size = 0;
             for (unsigned k = 0; k < n; ++k) {
-                rates_[k] += step(k, 0);
                 length += GiNaC::abs(GiNaC::ex_to<GiNaC::numeric>(step(k, 0)));
                 size += GiNaC::abs(GiNaC::ex_to<GiNaC::numeric>(rates_[k]));
             }
-            if (length <= rounding * size) return;
+            if (length <= rounding * size) return true;
+            std::optional<Missing> there;
+            std::vector<ex> trial;
+            for (int halving = 0; halving < most_halvings; ++halving) {
+                trial = rates_;
+                for (unsigned k = 0; k < n; ++k) trial[k] += step(k, 0) * GiNaC::numeric(2).power(-halving);
+                there = missing(momentum, trial);
+                if (there && (there->squares < here->squares || here->squares.is_zero())) break;
+                there.reset();
+            }
+            if (!there) return here->squares <= rounding * rounding * wanted;
+            rates_ = trial;
+            here = there;
         }
-        fail_at_clock(scene_, "no velocity was found that has the momentum at the start; give velocities");
+        return false;
     }
 
     void require_positive_rate() const {

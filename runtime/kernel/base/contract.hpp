@@ -19,7 +19,7 @@
 //   gives a constant part of S to iterate with; `clean` that steps are those of steppers/clean.hpp. Gauss's nodes stand
 //   between two ends of weight zero. `diagonal_part`: the constant part of S, from quadratic_part, is diagonal, D, and
 //   taken into the stage map.
-// Form::general: see steppers/general.hpp. `clocked` says that its Lagrangian is one in the time tau of a clock,
+// Form::general: iteration/galerkin_equations.hpp. `clocked`: its Lagrangian is one in the time tau of a clock,
 //   clock(k, q) = dt/dtau (steppers/clocked.hpp). `constraints` says how many constraints phi(q, t) = 0 there are;
 //   constraint(k, q, phi, phi_t, G) gives them, dphi/dt at fixed q, and the constraint_entries of G = dphi/dq;
 //   multiplier_terms(k, q, velocity, r, s) what multipliers follow from; `constant_mass` that M is constant and forces
@@ -201,7 +201,7 @@ struct FixedPointOf;
 
 // How the lanes of each form move by one step: start(single, lane) takes the state of a Stepper over, step(k, time,
 // active) moves the active lanes, and answers which have moved; position(c) and momentum(single, lane, p) read. What
-// all lanes of one step size share is read by shared(), and take(shared) sets it (steppers/device_lanes.hpp).
+// all lanes of one step size share is read by shared(), and take(shared) sets it (device_lanes.hpp).
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct LaneStepper;
 

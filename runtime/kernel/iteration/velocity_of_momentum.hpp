@@ -42,11 +42,12 @@ public:
             }
             rest(at, a);
             Status status = solve(at, a);
+            const bool has_no_rest = status == Status::not_finite;
             if (status != Status::ok) {
                 rest(at, a);
                 if (guess(a.x)) status = solve(at, a);
             }
-            for (int k = -1; k < most_directions && status != Status::ok; ++k) {
+            for (int k = -1; k < (has_no_rest ? most_directions : 0) && status != Status::ok; ++k) {
                 real direction[n] = {};
                 for (int i = 0; i < n; ++i) direction[i] = k < 0 ? p[i] : real(i == k / 2) * real(k % 2 == 0 ? 1 : -1);
                 begin_along(at, direction, a);
@@ -162,7 +163,7 @@ private:
     }
 
     // At rest there is no inverse, as of v^4, and no value of x'^2/t': the multiple of a direction whose own momentum
-    // is nearest. Directions are that of the momentum, and where it does not do those of the coordinates.
+    // is nearest. Directions are that of the momentum, and where rest has no value those of the coordinates.
     static void begin_along(const State& at, const real* direction, Arrays& a) {
         constexpr int moving = HasTimeCoordinate<K>::value ? n - 1 : n;
         real best = real(0), nearest = -real(1);

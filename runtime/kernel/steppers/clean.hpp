@@ -8,9 +8,8 @@
 //     eta_ij = eta_ji + gamma_i - gamma_j, all without rounding. With impulses f_j = -h b_j W(Q_j), however rounded,
 //         Q_i = q + gamma_i (u + f_1) + sum_j eta_ij f_j,   q1 = q + h (u + f_1) + sum_j beta_j f_j,   u1 = u + sum f
 //     is symplectic, since eta_ij - eta_ji = gamma_i - gamma_j. (In the nodes f and positions are rounded once.)
-//   Fixed-point iterations go on until they give the same bits again, or last bits alternate; a longer cycle of last
-//   bits is left after
-//     eight iterations. Newton's iteration takes the steps in which iterations do not get there.
+//   Fixed-point iterations end when they give the same bits again, when last bits alternate, or after eight that change
+//     only last bits. Newton's iteration takes the steps in which iterations do not get there.
 //   Position and velocity are sums of two numbers each, and the increments of a step are added without error: products
 //     with b_j too, whose rounding is not random where b_j is a simple fraction.
 // The scheme is that of Antonana, Makazaga and Murua (Numer. Algorithms 76, 2017) for Gauss' methods, in the form that

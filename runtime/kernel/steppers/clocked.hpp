@@ -155,10 +155,14 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         slow_down(position, velocity);
     }
     void momentum(real* momentum) const { Chain::momentum(momentum); }
+    // Where the time is a coordinate, `time` says it, and its velocity is 1.
     void momentum(real time, const real* position, const real* velocity, real* momentum) const {
-        real w[n];
-        in_clock_time(position, velocity, w);
-        Chain::momentum(time, position, w, momentum);
+        real there[n], w[n];
+        for (int k = 0; k < n; ++k) there[k] = position[k];
+        if constexpr (has_time_coordinate) there[n - 1] = time;
+        in_clock_time(there, velocity, w);
+        if constexpr (has_time_coordinate) w[n - 1] = clock_at(there);
+        Chain::momentum(time, there, w, momentum);
     }
     Status velocity(real time, const real* position, const real* momentum, real* velocity) const {
         const Status status = Chain::velocity(time, position, momentum, velocity);

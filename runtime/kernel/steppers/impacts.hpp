@@ -449,9 +449,7 @@ public:
         delete looks;
         looks = nullptr;
         if constexpr (WatchedStepper<K>::walls > 0)
-            if (stepper.step_size < real(0)) return started = Status::unsupported;
-        if constexpr (WatchedStepper<K>::walls > 0)
-            started = Sides<K>::start(stepper, time, q, p);
+            started = stepper.step_size < real(0) ? Status::unsupported : Sides<K>::start(stepper, time, q, p);
         else
             started = stepper.start(time, q, p);
         if (started == Status::ok) looks = new Looks(stepper);

@@ -4,8 +4,8 @@
 // Nothing is solved for, so that a step costs its gradients and no step can fail to converge. However their lengths are
 // rounded, a kick and a drift are symplectic. One trajectory goes by itself, its neighbouring coordinates in the lanes
 // of Packs where formulas join these; or several side by side.
-#ifndef LOBATTO_KERNEL_EXPLICIT_HPP
-#define LOBATTO_KERNEL_EXPLICIT_HPP
+#ifndef LOBATTO_KERNEL_SPLITTING_HPP
+#define LOBATTO_KERNEL_SPLITTING_HPP
 
 #include <cstdint>
 #include <type_traits>

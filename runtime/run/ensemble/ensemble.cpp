@@ -68,6 +68,7 @@ public:
           parts_(static_cast<std::size_t>(kernel->parts)),
           step_(request.whole_step.empty() ? as_parts({request.step}, parts_) : request.whole_step),
           single_(kernel) {
+        if (kernel->clocked != 0 && kernel->real_kind == LOBATTO_DOUBLE) clocked_.emplace(kernel);
         if (request.device)
             lanes_ = std::make_unique<DeviceTrajectories>(kernel, request, room, shared.halted);
         else if (kernel->lanes > 0)
@@ -137,7 +138,11 @@ private:
         for (std::size_t lane = 0; lane < width; ++lane) {  // those that are left over repeat the last
             if (lane < ended.size()) {
                 request_.start(request_.first + first + static_cast<std::int64_t>(lane), start_);
-                if (request_.from_velocities) turn_velocities_into_momenta();
+                if (request_.from_velocities)
+                    turn_velocities_into_momenta();
+                else if (clocked_ && clocked_->prepare(start_.parameters, request_.step) == LOBATTO_OK &&
+                         clocked_->start(request_.time, start_.q, start_.rate) == LOBATTO_OK)
+                    clocked_->state(time_of_start_, start_.q, start_.rate);
             }
             place(lane);
             if (lane < ended.size() && loses_velocity_) ended[lane].status = LOBATTO_SINGULAR_MASS;
@@ -241,6 +246,9 @@ private:
     std::size_t n_, parts_;
     std::vector<double> step_;
     NumberStepper single_;  // for momenta
+    // Of a kernel with a clock: it knows the momentum of the time.
+    std::optional<LoadedStepper<double>> clocked_;
+    double time_of_start_ = 0;
     std::unique_ptr<Trajectories> lanes_;
     EnsembleStart start_;
     std::vector<double> parameters_, q_, p_, energy_;

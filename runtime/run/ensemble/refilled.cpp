@@ -84,6 +84,10 @@ bool RefilledLanes::fill(std::size_t lane, std::int64_t number, Ended& ended) {
         } else {
             p.assign(n_, no_number);
         }
+    } else if (status == LOBATTO_OK && kernel_->clocked != 0 &&
+               to.stepper.start(request_.time, start_.q, p) == LOBATTO_OK) {
+        double time;  // the kernel knows the momentum of the time
+        to.stepper.state(time, start_.q, p);
     }
     if (status == LOBATTO_OK)
         status = static_cast<lobatto_status>(kernel_->refilled_fill(memory_.get(), static_cast<std::int32_t>(lane),
