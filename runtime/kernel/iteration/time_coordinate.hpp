@@ -6,6 +6,8 @@
 
 #include <type_traits>
 
+#include "../base/numbers.hpp"
+
 namespace lobatto {
 
 template <class K, class = void>

@@ -47,9 +47,9 @@ public:
                 rest(at, a);
                 if (guess(a.x)) status = solve(at, a);
             }
-            for (int k = -1; k < (has_no_rest ? most_directions : 0) && status != Status::ok; ++k) {
+            for (int d = -1; d < (has_no_rest ? most_directions : 0) && status != Status::ok; ++d) {
                 real direction[n] = {};
-                for (int i = 0; i < n; ++i) direction[i] = k < 0 ? p[i] : real(i == k / 2) * real(k % 2 == 0 ? 1 : -1);
+                for (int i = 0; i < n; ++i) direction[i] = d < 0 ? p[i] : real(i == d / 2) * real(d % 2 == 0 ? 1 : -1);
                 begin_along(at, direction, a);
                 if (solve(at, a) == Status::ok) status = Status::ok;
             }
