@@ -238,7 +238,10 @@ ex automatic_clock(const Scene& scene) {
     };
     const auto at_start = [&](const ex& formula) { return rounded(formula.subs(start)); };
     std::vector<TimeScale> scales = time_scales_of(scene, poles.terms);
-    if (scales.size() == 1) return GiNaC::pow(scales[0].base / at_start(scales[0].base), scales[0].exponent / 2);
+    if (scales.size() == 1) {  // a power of the base itself shares its roots with the potential
+        const ex power = GiNaC::pow(scales[0].base, scales[0].exponent / 2);
+        return power / at_start(power);
+    }
     if (agree_with_poles(scene, scales, *poles.least)) scales.clear();
     ex sum = 0, sum_at_start = 0;
     for (std::size_t i = 0; i < poles.terms.size(); ++i) {
@@ -248,7 +251,8 @@ ex automatic_clock(const Scene& scene) {
         sum_at_start += at_start(signed_at_start(poles.terms[i], term));
     }
     const GiNaC::numeric half(1, 2);
-    return GiNaC::pow(sum / sum_at_start, scales.empty() ? -(GiNaC::numeric(1) / *poles.least + half) : -half);
+    const GiNaC::numeric exponent = scales.empty() ? -(GiNaC::numeric(1) / *poles.least + half) : -half;
+    return GiNaC::pow(sum, exponent) / rounded(GiNaC::pow(sum_at_start, exponent));
 }
 
 bool has_automatic_clock(const Scene& scene) {

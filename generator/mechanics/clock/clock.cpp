@@ -23,11 +23,22 @@ using Symbols = std::vector<GiNaC::symbol>;
 // Terms longer than this are not expanded to find their degree.
 constexpr std::size_t longest_term = 2000;
 
-// The power of a positive g; of one that is a power itself, such as r^(3/2), one power and not two.
+bool is_broken_power(const ex& factor) {
+    return GiNaC::is_a<GiNaC::power>(factor) && factor.op(1).info(GiNaC::info_flags::rational) &&
+           !factor.op(1).info(GiNaC::info_flags::integer);
+}
+// Of a positive g: a broken power in it, which is positive like what stands beside it; 1 where there is none.
+ex broken_power_in(const ex& g) {
+    if (is_broken_power(g)) return g;
+    if (!GiNaC::is_a<GiNaC::mul>(g)) return 1;
+    const auto found = std::find_if(g.begin(), g.end(), is_broken_power);
+    return found == g.end() ? ex(1) : *found;
+}
+// The power of a positive g; of one that holds a power itself, such as r^(3/2), one power and not two.
 ex power_of(const ex& g, const ex& exponent) {
-    const bool is_power = GiNaC::is_a<GiNaC::power>(g) && g.op(1).info(GiNaC::info_flags::rational) &&
-                          !g.op(1).info(GiNaC::info_flags::integer);
-    return is_power ? GiNaC::pow(g.op(0), g.op(1) * exponent) : GiNaC::pow(g, exponent);
+    const ex inner = broken_power_in(g);
+    if (inner.is_equal(1)) return GiNaC::pow(g, exponent);
+    return GiNaC::pow(inner.op(0), inner.op(1) * exponent) * GiNaC::pow(g / inner, exponent);
 }
 
 // What is computed from values at the start; InputError where one is not finite and real.
@@ -259,8 +270,9 @@ private:
 
 GiNaC::numeric pace_exponent(const ex& g) {
     const GiNaC::numeric third(1, 3);
-    const bool is_power = GiNaC::is_a<GiNaC::power>(g) && g.op(1).info(GiNaC::info_flags::rational);
-    return is_power && (4 * g.op(1) * third).info(GiNaC::info_flags::integer) ? third : GiNaC::numeric(0);
+    const ex power = broken_power_in(g);
+    const bool has_root = !power.is_equal(1) && (4 * power.op(1) * third).info(GiNaC::info_flags::integer);
+    return has_root ? third : GiNaC::numeric(0);
 }
 
 ex clock_rate(const Scene& scene) {

@@ -119,6 +119,8 @@ LOBATTO_C_API int lobatto_integrator_take_events(lobatto_integrator* integrator,
 LOBATTO_C_API int lobatto_integrator_multipliers(lobatto_integrator* integrator, const double** multipliers,
                                                  size_t* count);
 
+/* n: those of the scene. A clock adds the time as the last one where the energy changes; a start sets it, and its
+ * momentum, whatever is given for them. */
 LOBATTO_C_API size_t lobatto_integrator_coordinates(const lobatto_integrator* integrator);
 LOBATTO_C_API double lobatto_integrator_step_size(const lobatto_integrator* integrator);
 LOBATTO_C_API double lobatto_integrator_t(const lobatto_integrator* integrator);

@@ -182,6 +182,8 @@ public:
     Stepper& operator=(Stepper&&) noexcept;
     ~Stepper();
 
+    /// n: those of the scene. A clock adds the time as the last one where the energy changes (docs/clocks.md); a start
+    /// sets it, and its momentum, whatever is given for them.
     std::size_t coordinates() const;
     std::size_t inputs() const;
     double step_size() const;
