@@ -81,7 +81,7 @@ std::vector<bool> StepJudge::resting(LoadedStepper<double>& stepper, const Traje
     Rows rows{{request.time}};
     rows[0].insert(rows[0].end(), request.q.begin(), request.q.end());
     rows[0].insert(rows[0].end(), request.p.begin(), request.p.end());
-    for (const SomeStates::State& state : some_.in_order()) rows.push_back(state.row);
+    for (const SomeStates::State& state : some_.scattered()) rows.push_back(state.row);
     return rests_beside(stepper, request.step, rows, sizes, slight(sizes));
 }
 
@@ -105,7 +105,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
         if (radians > judgement.radians) judgement.radians = radians;
     };
     int looks = 0;
-    for (const SomeStates::State& state : some_.in_order()) {
+    for (const SomeStates::State& state : some_.scattered()) {
         if (n > frequency_limit || looks++ == frequency_looks) break;
         const auto middle = state.row.begin() + 1 + static_cast<std::ptrdiff_t>(n);
         const std::vector<double> q(state.row.begin() + 1, middle), p(middle, state.row.end());
@@ -125,7 +125,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
     // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
     std::vector<double> by_constraints;
     const ConstraintSizes constraints(outline.system);
-    for (const SomeStates::State& state : some_.in_order())
+    for (const SomeStates::State& state : some_.scattered())
         constraints.widen(by_constraints, state.row[0], state.row.data() + 1, request.parameters);
     const std::vector<bool> moves =
         moving(least_, most_, places_of(least_, most_, by_constraints), rounding_of_run(kernel->epsilon));
@@ -145,7 +145,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
                                                               request.parameters, request.step, measure);
     if (unresolved) judgement.unresolved = {1 + std::llround((*unresolved - request.time) / request.step), *unresolved};
     std::vector<std::vector<double>> rows;
-    for (const SomeStates::State& state : some_.in_order())
+    for (const SomeStates::State& state : some_.scattered())
         if (rows.size() < force_looks) rows.push_back(state.row);
     std::vector<bool> swings(n);  // by more than the roundings of all steps
     for (std::size_t k = 0; k < n; ++k)

@@ -27,9 +27,14 @@ void SomeStates::observe(std::int64_t number, const double* row, std::size_t col
     states_.emplace(place, State{number, {row, row + columns}});
 }
 
-std::vector<SomeStates::State> SomeStates::in_order() const {
+std::vector<SomeStates::State> SomeStates::scattered() const {
     std::vector<State> all;
     for (const auto& [place, state] : states_) all.push_back(state);
+    return all;
+}
+
+std::vector<SomeStates::State> SomeStates::in_order() const {
+    std::vector<State> all = scattered();
     std::sort(all.begin(), all.end(), [](const State& a, const State& b) { return a.number < b.number; });
     return all;
 }

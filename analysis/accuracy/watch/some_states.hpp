@@ -21,7 +21,8 @@ public:
 
     void observe(std::int64_t number, const double* row, std::size_t columns);
     bool empty() const { return states_.empty(); }
-    std::vector<State> in_order() const;  // of their numbers
+    std::vector<State> in_order() const;   // of their numbers
+    std::vector<State> scattered() const;  // the first of these are of all times, too
 
     // As numbers, 1 + columns for each.
     void save(std::vector<double>& to) const;

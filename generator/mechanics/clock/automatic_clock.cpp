@@ -44,6 +44,20 @@ GiNaC::numeric least_degree_of(const ex& base, const Symbols& positions) {
     return whole.is_polynomial(scale) ? whole.ldegree(scale) : 0;
 }
 
+struct SymbolsOfMotion {
+    Symbols positions, velocities, all;
+};
+SymbolsOfMotion symbols_of_motion(const Scene& scene) {
+    SymbolsOfMotion symbols;
+    for (const Coordinate& coordinate : scene.coordinates) {
+        symbols.positions.push_back(coordinate.position);
+        symbols.velocities.push_back(coordinate.velocity);
+    }
+    symbols.all = symbols.positions;
+    symbols.all.insert(symbols.all.end(), symbols.velocities.begin(), symbols.velocities.end());
+    return symbols;
+}
+
 struct Pole {
     ex term;
     GiNaC::numeric degree;  // k of r^-k
@@ -84,13 +98,7 @@ struct Poles {
     std::optional<GiNaC::numeric> least;
 };
 Poles poles_of(const Scene& scene) {
-    Symbols positions, velocities, motion;
-    for (const Coordinate& coordinate : scene.coordinates) {
-        positions.push_back(coordinate.position);
-        velocities.push_back(coordinate.velocity);
-    }
-    motion = positions;
-    motion.insert(motion.end(), velocities.begin(), velocities.end());
+    const auto [positions, velocities, motion] = symbols_of_motion(scene);
     Poles poles;
     for (const ex& term : terms_of(scene.lagrangian, motion)) {
         const auto pole = holds(term, velocities) ? std::nullopt : pole_of(term, positions, scene.time);
@@ -165,13 +173,7 @@ std::optional<TimeScale> time_scale_of(const ex& term, const Symbols& positions,
 
 // Of all terms, or nothing.
 std::vector<TimeScale> time_scales_of(const Scene& scene, const std::vector<ex>& terms) {
-    Symbols positions, velocities, motion;
-    for (const Coordinate& coordinate : scene.coordinates) {
-        positions.push_back(coordinate.position);
-        velocities.push_back(coordinate.velocity);
-    }
-    motion = positions;
-    motion.insert(motion.end(), velocities.begin(), velocities.end());
+    const auto [positions, velocities, motion] = symbols_of_motion(scene);
     const auto masses = masses_of(scene, velocities, motion);
     std::vector<TimeScale> scales;
     if (!masses) return scales;

@@ -192,7 +192,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
 
 private:
     bool is_ahead(real duration) const { return step_size > real(0) ? duration > real(0) : duration < real(0); }
-    // sigma = g^(1 - a) (|p v / 2| + |H - p v / 2|): the last term of (D64) is as large as those of L.
+    // sigma = g^(1 - a) (|p v / 2| + |H - p v / 2|) / 2: the last term of (D64) is about as large as those of L.
     Status scale_of(const real* position, const real* momentum, real energy_of_start, real& sigma) const {
         real v[n], half = real(0);
         const Status status = velocity(real(0), position, momentum, v);
