@@ -67,7 +67,7 @@ std::string with_loops_of_device(const std::string& text, bool written_out) {
 std::string support_of_lanes(const KernelSource& source, const WatchedLanes& watched) {
     if (!watched.any()) return support_text(with_ensemble(source.support));
     std::vector<std::string> names = source.support;
-    names.push_back("steppers/impacts.hpp");
+    names.push_back("steppers/watch.hpp");
     return "#define LOBATTO_DEVICE_WATCHES\n" + support_text(with_refilled_ensemble(names));
 }
 

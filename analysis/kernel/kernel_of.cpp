@@ -18,7 +18,7 @@ namespace {
 std::string support_of(const KernelSource& source, bool is_ensemble, bool is_refilled) {
     if (source.support.empty()) return support_text();
     std::vector<std::string> names = source.support;
-    names.push_back("steppers/impacts.hpp");
+    names.push_back("steppers/watch.hpp");
     return support_text(is_refilled ? with_refilled_ensemble(names) : is_ensemble ? with_ensemble(names) : names);
 }
 

@@ -35,7 +35,7 @@ std::vector<std::string> support_of(const Derivation& derivation, const Graph& g
     if (derivation.structure.neighbours()) parts.insert("iteration/neighbours.hpp");
     if (!is_one_dense_group(derivation.structure.groups)) parts.insert("base/grouped.hpp");
     if (has_full_matrix(derivation)) parts.insert("base/full_matrix.hpp");
-    if (!derivation.scene.watched().empty()) parts.insert("steppers/impacts.hpp");
+    if (!derivation.scene.watched().empty()) parts.insert("steppers/hybrid_stepper.hpp");
     if (!derivation.system.inputs.empty()) parts.insert("steppers/inputs.hpp");
     for (Id id = 0; id < graph.size(); ++id) switch (graph[id].op) {
             case Op::sin:

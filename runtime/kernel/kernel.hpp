@@ -49,7 +49,7 @@
 #include "steppers/ensemble.hpp"
 #include "steppers/events.hpp"
 #include "steppers/general.hpp"
-#include "steppers/impacts.hpp"
+#include "steppers/hybrid_stepper.hpp"
 #include "steppers/inputs.hpp"
 #include "steppers/lent_steps.hpp"
 #include "steppers/linear.hpp"
@@ -57,7 +57,10 @@
 #include "steppers/sampled_function.hpp"
 #include "steppers/separable.hpp"
 #include "steppers/shortened.hpp"
+#include "steppers/sides.hpp"
 #include "steppers/splitting.hpp"
+#include "steppers/walls.hpp"
+#include "steppers/watch.hpp"
 #include "steppers/watched_stepper.hpp"
 
 #endif

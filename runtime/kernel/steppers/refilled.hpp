@@ -12,8 +12,8 @@
 
 #include "ensemble.hpp"
 #include "events.hpp"
-#include "impacts.hpp"
 #include "lent_steps.hpp"
+#include "watch.hpp"
 
 namespace lobatto {
 

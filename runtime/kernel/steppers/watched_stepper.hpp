@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A stepper whose motion is watched: states between its steps, and what is known of its events and walls.
 //
-// K::events functions are watched: first events, then the K::stops, which end the motion, then walls (impacts.hpp). The
+// K::events functions are watched: first events, then the K::stops, which end the motion, then walls (walls.hpp). The
 // motion stays on one side of a wall until it meets it; a value that is only rounding counts as zero. K::impacts walls
 // throw the motion back. The last K::switches walls change its formulas; their sides, 1 or -1, are the last parameters.
 // impact(k, q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of each wall. Where reset_of[] of it is not

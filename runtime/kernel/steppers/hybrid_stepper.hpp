@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+// A stepper with all that its kernel looks for: events, stops, impacts, switches. A step is one from t to t + h,
+// whatever it meets on the way. For programs that hold a kernel's text; it allocates when it starts.
+#ifndef LOBATTO_KERNEL_HYBRID_STEPPER_HPP
+#define LOBATTO_KERNEL_HYBRID_STEPPER_HPP
+
+#include "../base/contract.hpp"
+#include "../base/numbers.hpp"
+#include "watch.hpp"
+
+namespace lobatto {
+
+template <class K>
+class HybridStepper {
+public:
+    using real = typename K::real;
+    static constexpr int n = K::coordinates, columns = Watch<K>::columns;
+
+    HybridStepper() = default;
+    HybridStepper(const HybridStepper&) = delete;
+    HybridStepper& operator=(const HybridStepper&) = delete;
+    ~HybridStepper() { delete looks; }
+
+    void set_tolerance(real tolerance) { stepper.tolerance = tolerance; }  // of increments, relative; 0: to rounding
+    Status prepare(const typename K::Parameters& parameters, real h) {
+        delete looks;
+        looks = nullptr;
+        started = Status::unsupported;
+        stepper.parameters = parameters;
+        return stepper.prepare(parameters, h);
+    }
+    // Status::off_constraints behind a wall; Status::unsupported where walls or switches are and h < 0.
+    Status start(real time, const real* q, const real* p) {
+        delete looks;
+        looks = nullptr;
+        if constexpr (WatchedStepper<K>::walls > 0)
+            started = stepper.step_size < real(0) ? Status::unsupported : Sides<K>::start(stepper, time, q, p);
+        else
+            started = stepper.start(time, q, p);
+        if (started == Status::ok) looks = new Looks(stepper);
+        return started;
+    }
+    // Status::stopped: the motion met a stop in this step, where the last event says. Without a start:
+    // Status::unsupported; after one that was refused: the status of that one.
+    Status step() {
+        if (looks == nullptr) return started;
+        looks->count = 0;
+        looks->watch.keep(stepper);
+        const Status status = stepper.step();
+        return status == Status::ok ? looks->watch.look(stepper, looks->rows, looks->count) : status;
+    }
+
+    // Of a kernel with inputs, before a step: their values in `values`, the others of which do not count.
+    Status set_inputs(const typename K::Parameters& values) { return set_watched_inputs(stepper, values); }
+
+    real time() const { return stepper.time(); }
+    const real* q() const { return stepper.q; }
+    void momentum(real* p) const { stepper.momentum(p); }
+    // Of the last step, in the order of the motion: number (those of the scene: events, stops, impacts), t, q[n], p[n];
+    // of an impact the state after it.
+    std::int64_t events() const { return looks == nullptr ? 0 : looks->count; }
+    const real* event(std::int64_t i) const { return looks->rows + i * columns; }
+
+private:
+    struct Looks {
+        explicit Looks(const WatchedStepper<K>& stepper) : watch(stepper) {}
+        Watch<K> watch;
+        real rows[Watch<K>::most * columns];
+        std::int64_t count = 0;
+    };
+    WatchedStepper<K> stepper{};
+    Status started = Status::unsupported;
+    Looks* looks = nullptr;
+};
+
+}  // namespace lobatto
+
+#endif

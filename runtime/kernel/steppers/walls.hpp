@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+// Walls: what they are at a state, and what they do to a momentum there (D52).
+//
+// A wall is g(t, q) = 0, and the motion is on one side of it. Where it meets the wall the momentum jumps along dg/dq.
+// (R. C. Fetecau, J. E. Marsden, M. Ortiz, M. West 2003.)
+#ifndef LOBATTO_KERNEL_WALLS_HPP
+#define LOBATTO_KERNEL_WALLS_HPP
+
+#include "../base/contract.hpp"
+#include "../base/numbers.hpp"
+#include "watched_stepper.hpp"
+
+namespace lobatto {
+
+// At a state: the walls of K, what they are there, and what they do.
+template <class K>
+struct Walls {
+    using real = typename K::real;
+    using S = WatchedStepper<K>;
+    static constexpr int n = K::coordinates, impacts = K::impacts, count = S::walls, first = K::events - count;
+    static constexpr int room = impacts > 0 ? impacts : 1;
+    static constexpr real few = real(64) * Limits<real>::epsilon;
+
+    real time{}, q[n]{}, p[n]{}, velocity[n]{};
+    real value[K::events]{};                  // of all that is watched
+    real gradient[room * n]{}, rate[room]{};  // of impacts: dg/dq, and dg/dt at fixed q
+    real restitution[room]{};
+    real slack[count]{};    // g as small as this is zero
+    real approach[room]{};  // dg/dt along the motion, where it is above rounding; below 0: towards the wall
+
+    // Everything at (t, q, p) of a stepper.
+    Status look(S& stepper, real t, const real* position, const real* momentum) {
+        time = t;
+        for (int k = 0; k < n; ++k) {
+            q[k] = position[k];
+            p[k] = momentum[k];
+        }
+        const Status status = stepper.velocity(time, q, p, velocity);
+        if (status != Status::ok) return status;
+        const auto& k = stepper.coefficients;
+        Formulas<K>::event(k, time, q, velocity, value);
+        if constexpr (impacts > 0) look_at_impacts(stepper);
+        for (int w = 0; w < count; ++w) {
+            real& scale = stepper.wall_scale[w];
+            if (w >= impacts && fabs(value[first + w]) > scale) scale = fabs(value[first + w]);
+            slack[w] = few * scale;
+        }
+        return Status::ok;
+    }
+
+    // The sign of g where the motion is.
+    static real side(S& stepper, int w) {
+        return w < impacts ? real(-K::event_direction[first + w]) : stepper.side(w - impacts);
+    }
+    bool is_behind(int w) const { return value[first + w] * real(-K::event_direction[first + w]) < -slack[w]; }
+    bool is_behind() const {  // of one of the impacts
+        for (int w = 0; w < impacts; ++w)
+            if (is_behind(w)) return true;
+        return false;
+    }
+    bool is_met(int w) const { return fabs(value[first + w]) <= slack[w] && approach[w] < real(0); }
+
+    // (D52) What wall w does to the momentum.
+    Status hit(S& stepper, int w) {
+        if (K::reset_of[w] >= 0) return reset(stepper, K::reset_of[w]);
+        real change[n], mobility;
+        const Status status = push(stepper, w, change, mobility);
+        if (status != Status::ok) return status;
+        const real impulse = -(real(1) + restitution[w]) * approach[w] * side(stepper, w) / mobility;
+        if (!is_finite(impulse)) return Status::not_finite;
+        if constexpr (constraints_of<K>() > 0) {
+            for (int c = 0; c < n; ++c) velocity[c] += impulse * change[c];
+            stepper.momentum(time, q, velocity, p);
+        } else {
+            for (int c = 0; c < n; ++c) p[c] += impulse * gradient[w * n + c];
+        }
+        return look(stepper, time, q, p);
+    }
+
+    // A motion may leave a body behind a wall by what a rounding of the largest coordinate does to g. Such a depth is
+    // zero from then on. The metric of the kinetic energy makes one unit of all coordinates: g grows by sqrt(dq M dq)
+    // sqrt(dg/dq M^-1 dg/dq) at most; where masses are far apart that is too much, and |dg/dq| |dq| counts.
+    void forgive_rounding(S& stepper) {
+        const real h = stepper.step_size;
+        real still[n] = {}, rest[n], moved[n], size = real(0), farthest = real(0), change[n], mobility;
+        stepper.momentum(time, q, still, rest);
+        stepper.momentum(time, q, q, moved);
+        for (int c = 0; c < n; ++c) {
+            size += q[c] * (moved[c] - rest[c]) + h * h * velocity[c] * (p[c] - rest[c]);
+            for (const real far : {fabs(q[c]), fabs(h * velocity[c])}) farthest = far > farthest ? far : farthest;
+        }
+        for (int w = 0; w < impacts; ++w) {
+            const real depth = fabs(value[first + w]);
+            if (!is_behind(w) || push(stepper, w, change, mobility) != Status::ok) continue;
+            real slope = real(0);
+            for (int c = 0; c < n; ++c) slope += fabs(gradient[w * n + c]);
+            if (depth <= few * sqrt(size * mobility) && depth <= few * slope * farthest)
+                stepper.wall_scale[w] = (real(1) + few) * depth / few;
+        }
+    }
+
+    // Positions and velocities as the scene gives them.
+    Status reset(S& stepper, int r) {
+        if constexpr (K::resets > 0) {
+            real positions[K::resets * n], velocities[K::resets * n];
+            Formulas<K>::reset(stepper.coefficients, time, q, velocity, positions, velocities);
+            stepper.momentum(time, positions + r * n, velocities + r * n, p);
+            return look(stepper, time, positions + r * n, p);
+        }
+        (void)stepper, (void)r;
+        return Status::unsupported;
+    }
+
+private:
+    // An impulse of dg/dq on the motion at rest: the velocity that it gives, and dg/dt.
+    Status push(S& stepper, int w, real* change, real& mobility) {
+        real still[n] = {}, rest[n], pushed[n], without[n];
+        stepper.momentum(time, q, still, rest);
+        for (int c = 0; c < n; ++c) pushed[c] = rest[c] + gradient[w * n + c];
+        Status status = stepper.velocity(time, q, rest, without);
+        if (status == Status::ok) status = stepper.velocity(time, q, pushed, change);
+        if (status != Status::ok) return status;
+        mobility = real(0);
+        for (int c = 0; c < n; ++c) {
+            change[c] -= without[c];
+            mobility += gradient[w * n + c] * change[c];
+        }
+        return Status::ok;
+    }
+
+    void look_at_impacts(S& stepper) {
+        Formulas<K>::impact(stepper.coefficients, time, q, gradient, rate, restitution);
+        for (int w = 0; w < impacts; ++w) {
+            const real step = fabs(stepper.step_size), passed = fabs(time) > step ? fabs(time) : step;
+            real along = rate[w], speed = fabs(rate[w]), moved = speed * passed;
+            for (int c = 0; c < n; ++c) {
+                const real slope = gradient[w * n + c], way = fabs(velocity[c] * stepper.step_size);
+                along += slope * velocity[c];
+                speed += fabs(slope * velocity[c]);
+                moved += fabs(slope) * (fabs(q[c]) > way ? fabs(q[c]) : way);
+            }
+            if (moved > stepper.wall_scale[w]) stepper.wall_scale[w] = moved;
+            approach[w] = fabs(along) <= few * speed ? real(0) : along * side(stepper, w);
+        }
+    }
+};
+
+}  // namespace lobatto
+
+#endif

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+// What is looked for in each step: events, impacts, and where the motion is to stop.
+//
+// A step that meets a wall is cut there, at the end of a step of the same method; the momentum jumps (walls.hpp), and a
+// step of the rest of h leads back to the times of the run. So a step with impacts is one from t to t + h like any
+// other, and of the method's order. A switch cuts a step too; the rest follows other formulas.
+#ifndef LOBATTO_KERNEL_WATCH_HPP
+#define LOBATTO_KERNEL_WATCH_HPP
+
+#include "../base/contract.hpp"
+#include "../base/numbers.hpp"
+#include "events.hpp"
+#include "sides.hpp"
+
+namespace lobatto {
+
+// Looks at each step of one stepper: keep before it, look after it.
+template <class K>
+class Watch {
+public:
+    using real = typename K::real;
+    using S = WatchedStepper<K>;
+    static constexpr int n = K::coordinates, columns = Events<K>::columns;
+    static constexpr int walls = S::walls, first_wall = K::events - walls, stops = stops_of<K>();
+    static constexpr bool goes_back = !is_clocked<K>();
+    static constexpr int most_impacts = walls > 0 ? 100 : 0;                             // in one step
+    static constexpr int most = Events<K>::most + most_impacts * (1 + Events<K>::most);  // rows of one step
+
+    // Of the last step: when walls and switches cut it.
+    real cut_at[most_impacts + 1]{};
+    int cuts{};
+
+    explicit Watch(const S& stepper) : events(stepper), rest(walls > 0 ? new S(stepper) : nullptr) {}
+    Watch(const Watch&) = delete;
+    Watch& operator=(const Watch&) = delete;
+    ~Watch() { delete rest; }
+
+    void keep(const S& stepper) {
+        events.keep(stepper);
+        if constexpr (goes_back) {
+            time = stepper.time();
+            parameters = stepper.parameters;
+            for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
+            stepper.momentum(p);
+        }
+    }
+
+    // Adds rows of event number, t, q[n], p[n] of the step taken since keep, in the order of the motion; of an impact
+    // the state after it. Without rows none are sought, and the motion does not stop. Status::stopped: the last row
+    // says where and why. Where the search fails, the stepper is where it was before the step; one with a clock is at
+    // its end.
+    Status look(S& stepper, real* rows, std::int64_t& count) {
+        const std::int64_t before = count;
+        Status status = Status::ok;
+        if constexpr (walls > 0) {
+            status = look_with_walls(stepper, rows, count);
+            if (status != Status::ok) go_back(stepper);
+        } else if (rows != nullptr) {
+            status = find(stepper, real(1), Cut::none, rows, count);
+            if constexpr (goes_back)
+                if (status != Status::ok && status != Status::stopped) go_back(stepper);
+        }
+        if (status != Status::ok && status != Status::stopped) count = before;  // the step was not taken
+        return status;
+    }
+
+private:
+    Events<K> events;
+    S* rest;  // the steps from an impact to the end
+    real time{}, q[n]{}, p[n]{};
+    typename K::Parameters parameters{};
+    int impacts{};  // of this step
+
+    // Events and stops until theta.
+    Status find(S& stepper, real until, Cut cut, real* rows, std::int64_t& count) {
+        Status status = events.find(stepper, 0, first_wall, until, cut);
+        for (int i = 0; i < events.found && status == Status::ok; ++i) {
+            real* const row = rows + count * columns;
+            row[0] = real(events.numbers[i]);
+            status = events.state(events.thetas[i], row + 1);
+            if (status != Status::ok) break;
+            ++count;
+            if (events.numbers[i] >= first_wall - stops) return Status::stopped;
+        }
+        return status;
+    }
+
+    void go_back(S& stepper) {
+        stepper.parameters = parameters;
+        put(stepper, q, p, stepper.steps - 1);
+    }
+    // A state at one of the stepper's own times, with its parameters.
+    static void put(S& stepper, const real* position, const real* momentum, std::int64_t steps) {
+        if constexpr (switches_of<K>() > 0) stepper.prepare(stepper.parameters, stepper.step_size);
+        stepper.restart(position, momentum, steps);
+    }
+
+    Status look_with_walls(S& stepper, real* rows, std::int64_t& count) {
+        const real end = stepper.time();
+        Walls<K> wall;
+        Status status = wall.look(stepper, time, q, p);
+        S* step = &stepper;
+        impacts = cuts = 0;
+        while (status == Status::ok) {
+            for (int w = 0; w < walls; ++w) {
+                events.slack[w] = wall.slack[w];
+                events.sides[w] = Walls<K>::side(stepper, w);
+            }
+            status = events.find(*step, first_wall, K::events, real(1));
+            if (status != Status::ok) break;
+            const bool is_hit = events.found > 0;
+            const real theta = is_hit ? events.thetas[0] : real(1);
+            const int number = is_hit ? events.numbers[0] : -1;
+            const Cut cut = !is_hit ? Cut::none : number - first_wall < impacts_of<K>() ? Cut::impact : Cut::passage;
+            if (rows != nullptr) {
+                status = find(*step, theta, cut, rows, count);
+                if (status != Status::ok) break;
+            }
+            if (!is_hit) break;
+            const KnownEvents<S> known(*step);
+            real row[1 + 2 * n];
+            status = events.state(theta, row);
+            if constexpr (switches_of<K>() > 0)
+                if (status == Status::ok) Sides<K>::scale_switches(stepper, row[0], row + 1, row + 1 + n);
+            if (status == Status::ok) status = wall.look(stepper, row[0], row + 1, row + 1 + n);
+            if (status == Status::ok) status = pass(stepper, wall, number - first_wall, rows, count);
+            if (status != Status::ok) break;
+            cut_at[cuts++] = wall.time;
+            const real left = end - wall.time;
+            step = rest;
+            if (!(left * stepper.step_size > real(0)) || wall.time + left == wall.time) {
+                put(stepper, wall.q, wall.p, stepper.steps);
+                if (cut == Cut::passage) known.put(stepper);
+                return Status::ok;
+            }
+            status = take_rest(stepper, wall, left, cut == Cut::passage ? &known : nullptr);
+        }
+        if (status == Status::ok && step == rest) finish(stepper);
+        return status;
+    }
+
+    // Through a switch, or back from walls.
+    Status pass(S& stepper, Walls<K>& wall, int number, real* rows, std::int64_t& count) {
+        if constexpr (impacts_of<K>() > 0) {
+            if (number < impacts_of<K>()) return meet(stepper, wall, number, rows, count);
+        }
+        (void)wall, (void)rows, (void)count;
+        if (++impacts > most_impacts) return Status::impacts_accumulate;
+        real& side = stepper.side(number - impacts_of<K>());
+        side = -side;
+        return K::prepare(stepper.parameters, stepper.step_size, stepper.coefficients);
+    }
+
+    // All walls that are met there, one after another, until none is.
+    Status meet(S& stepper, Walls<K>& wall, int first, real* rows, std::int64_t& count) {
+        for (bool is_first = true;; is_first = false) {
+            int met = is_first && K::reset_of[first] >= 0 ? first : -1;
+            for (int w = 0; w < impacts_of<K>() && met < 0; ++w)
+                if (wall.is_met(w) || (is_first && w == first && wall.approach[w] < real(0))) met = w;
+            if (met < 0) return is_first ? Status::impacts_accumulate : Status::ok;
+            if (++impacts > most_impacts) return Status::impacts_accumulate;
+            const Status status = wall.hit(stepper, met);
+            if (status != Status::ok) return status;
+            if (rows == nullptr) continue;
+            real* const row = rows + count++ * columns;
+            row[0] = real(first_wall + met);
+            row[1] = wall.time;
+            for (int k = 0; k < n; ++k) {
+                row[2 + k] = wall.q[k];
+                row[2 + n + k] = wall.p[k];
+            }
+        }
+    }
+
+    // `known`: of the events of a motion that goes on.
+    Status take_rest(S& stepper, const Walls<K>& wall, real left, const KnownEvents<S>* known) {
+        rest->parameters = stepper.parameters;
+        Status status = rest->prepare(stepper.parameters, left);
+        rest->tolerance = stepper.tolerance;
+        if (status == Status::ok) status = rest->start(wall.time, wall.q, wall.p);
+        if (known != nullptr) known->continue_in(*rest);
+        events.keep(*rest);
+        if (status == Status::ok) status = rest->step();
+        if constexpr (S::N > 0) stepper.iterations += rest->iterations;
+        return status;
+    }
+
+    void finish(S& stepper) {
+        real momentum[n];
+        rest->momentum(momentum);
+        put(stepper, rest->q, momentum, stepper.steps);
+        KnownEvents<S>(*rest).put(stepper);
+    }
+};
+
+}  // namespace lobatto
+
+#endif
