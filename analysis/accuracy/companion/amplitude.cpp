@@ -23,10 +23,6 @@ constexpr std::size_t first_compared = 16;  // comparisons: by then other motion
 
 }  // namespace
 
-double beside(double start) {
-    return start + 4 * (std::nextafter(start, HUGE_VAL) - start);
-}
-
 std::vector<int> amplitude_groups(const Scene& scene) {
     std::map<std::string, int> numbers;
     std::vector<int> groups;

@@ -12,14 +12,8 @@
 namespace lobatto {
 
 constexpr double by_chance = 0.1;  // of an amplitude: what is apart by more may meet again, and is no small error then
-constexpr double out_of_step = 0.5;     // of an amplitude: two motions of which each knows nothing of the other
-constexpr double momenta_alone = 0.01;  // likewise: where positions agree to this, momenta alone lose no motion. They
-                                        // may turn within a moment, as at the pericentre of a long orbit
-constexpr double noise = 1e-10;         // of what moves a number: where that cancels, rounding leaves less
-
-// Where a companion begins: a few units in the last place beside the start, so that it leaves it where nearby
-// trajectories diverge, also when the motion itself stands still in rounding.
-double beside(double start);
+constexpr double out_of_step = 0.5;  // of an amplitude: two motions of which each knows nothing of the other
+constexpr double noise = 1e-10;      // of what moves a number: where that cancels, rounding leaves less
 
 // Coordinates whose errors are measured by one amplitude have the same number: those of an array.
 std::vector<int> amplitude_groups(const Scene& scene);

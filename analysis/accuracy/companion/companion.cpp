@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "analysis/accuracy/companion/distance.hpp"
 #include "runtime/run/parts.hpp"
 
 namespace lobatto {
@@ -255,13 +256,7 @@ void Companion::compute() {
     }
     if (done == 0 && !is_finer_) {
         std::vector<double> moved = place.q;
-        for (std::size_t k = 0; k < moved.size(); k += parts_) {
-            if (moved[k] == 0) continue;
-            if (kernel_->real_kind == LOBATTO_DOUBLE)
-                moved[k] = beside(moved[k]);
-            else
-                moved[k + parts_ - 1] += 4 * kernel_->epsilon * moved[k];
-        }
+        move_beside(kernel_, moved);
         if (place.stepper.prepare(request_.whole_parameters, request_.whole_step) == LOBATTO_OK &&
             place.stepper.start(place.time, moved, place.p) == LOBATTO_OK)
             place.q = moved;  // else the start is at the edge of where the Lagrangian is real

@@ -9,6 +9,7 @@
 
 #include "analysis/accuracy/companion/amplitude.hpp"
 #include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/accuracy/companion/distance.hpp"
 #include "runtime/run/parts.hpp"
 
 namespace lobatto {
@@ -139,7 +140,6 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
 }
 
 MeasuredError Companion::compare(const TrajectoryResult& result) const {
-    const std::size_t n = groups_.size();
     const std::size_t count = std::min(run_.size(), companion_.size());
     const std::vector<double> amplitude = amplitudes(count);
     MeasuredError error;
@@ -148,33 +148,16 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const std::optional<double> stopped = is_beyond ? std::nullopt : stopped_;
     error.companion_stopped = stopped;
     ErrorCourse course;
-    struct {
-        double end = 0, absolute = 0;
-        std::size_t coordinate = 0;
-    } worst;
+    const double of_run = error_of_run(ratio_of(segment(0)), kernel_->order);
+    Distance last, worst;
     for (std::size_t j = 0; j < count; ++j) {
-        const double ratio = ratio_of(segment(0)), of_run = 1 / (1 - std::pow(ratio, -kernel_->order));
+        const Distance distance =
+            distance_between(run_[j].row.data(), companion_[j].row.data(), parts_, amplitude, of_run);
         error.until = time_after(request_, run_[j].steps);
-        error.end = 0;
-        double apart = 0;
-        bool agree = true, any = false;  // positions
-        for (std::size_t i = 0; i < 2 * n; ++i) {
-            if (!(amplitude[i] > 0)) continue;
-            const double distance =
-                std::fabs(difference(run_[j].row.data() + i * parts_, companion_[j].row.data() + i * parts_, parts_));
-            apart = std::fmax(apart, distance / amplitude[i]);
-            any = any || i < n;
-            agree = agree && (i >= n || distance < momenta_alone * amplitude[i]);
-            if (i >= n || !(of_run * distance / amplitude[i] > error.end)) continue;
-            error.end = of_run * distance / amplitude[i];
-            error.coordinate = i;
-            error.absolute = of_run * distance;
-        }
-        if (any && agree) apart = std::fmin(apart, momenta_alone);
-        if (error.end > error.largest) worst = {error.end, error.absolute, error.coordinate};
-        error.largest = std::fmax(error.largest, error.end);
-        course.emplace_back(std::fabs(error.until - request_.time), std::fmax(error.largest, apart));
-        if (!error.lost_after && !(apart < out_of_step)) lose(error, error.until, rounded(run_[j].row, parts_));
+        if (j == 0 || distance.relative > worst.relative) worst = distance;
+        last = distance;
+        course.emplace_back(std::fabs(error.until - request_.time), std::fmax(worst.relative, distance.apart));
+        if (!error.lost_after && distance.is_lost()) lose(error, error.until, rounded(run_[j].row, parts_));
     }
     if (!error.lost_after && stopped && count > 0) {
         lose(error, *stopped, rounded(run_[count - 1].row, parts_));
@@ -187,17 +170,17 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     error.doubling = doubling_of(course);
     // Errors that grow exponentially do not shrink again: two motions that were out of step have met by chance.
     const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });
-    if (!error.lost_after && error.doubling && large != course.end() && error.end < error.largest / 4) {
+    if (!error.lost_after && error.doubling && large != course.end() && last.relative < worst.relative / 4) {
         const Point& point = run_[static_cast<std::size_t>(large - course.begin())];
         lose(error, time_after(request_, point.steps), rounded(point.row, parts_));
     }
     // Two motions so far apart may be near one another at one time, as pendulums are where they turn: the largest
     // difference is what is known.
-    if (error.largest > by_chance) {
-        error.end = worst.end;
-        error.absolute = worst.absolute;
-        error.coordinate = worst.coordinate;
-    }
+    const Distance& known = worst.relative > by_chance ? worst : last;
+    error.end = known.relative;
+    error.absolute = known.absolute;
+    error.coordinate = known.coordinate;
+    error.largest = worst.relative;
     error.at_end = error.end;
     if (!error.complete && !course.empty()) {
         const double whole = std::fabs(result.time - request_.time), part = course.back().first;

@@ -9,6 +9,7 @@
 
 #include "analysis/accuracy/companion/amplitude.hpp"
 #include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/accuracy/companion/distance.hpp"
 #include "analysis/accuracy/companion/errors_of_steps.hpp"
 #include "runtime/build/number_stepper.hpp"
 #include "runtime/run/parts.hpp"
@@ -80,17 +81,6 @@ void EnsembleCompanion::compute(std::int64_t first) {
     seconds_of_one_ = std::fmax(took.count(), 1e-9) / static_cast<double>(count);
 }
 
-// The positions by four units in the last place.
-void EnsembleCompanion::move(EnsembleStart& start) const {
-    if (kernel_->real_kind == LOBATTO_DOUBLE) {
-        for (double& x : start.q)
-            if (x != 0) x = beside(x);
-        return;
-    }
-    std::vector<double>& q = parts_ == 1 ? start.q : start.whole_q;
-    for (std::size_t k = 0; k < q.size(); k += parts_) q[k + parts_ - 1] += 4 * kernel_->epsilon * q[k];
-}
-
 void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_t every) {
     const std::size_t n = groups_.size();
     EnsembleRequest companion = request_;
@@ -101,7 +91,7 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
         request_.start(first_ + index, start);
         const std::vector<double>& rows = known_[static_cast<std::size_t>(index)].rows;
         if (begin == 0) {
-            move(start);
+            move_beside(kernel_, parts_ == 1 ? start.q : start.whole_q);
         } else if (rows.size() >= 2 * n * parts_) {
             const auto one = static_cast<std::ptrdiff_t>(n * parts_);
             (parts_ == 1 ? start.q : start.whole_q).assign(rows.end() - 2 * one, rows.end() - one);
@@ -280,24 +270,13 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio
                              : static_cast<double>(steps_taken(every())) / static_cast<double>(every()),
-                 of_run = 1 / (1 - std::pow(ratio, -kernel_->order));
+                 of_run = error_of_run(ratio, kernel_->order);
     Error error{0, false};
     double largest = 0;
     for (std::int64_t j = 0; j < comparisons; ++j) {
-        const double *const run = run_at(j), *const companion = companion_at(j);
-        error.relative = 0;
-        bool is_apart = false, agree = true, any = false;  // any that agree: positions
-        for (std::size_t i = 0; i < 2 * n; ++i) {
-            if (!(amplitude[i] > 0)) continue;
-            const double apart = std::fabs(difference(run + i * parts_, companion + i * parts_, parts_)) / amplitude[i];
-            is_apart = is_apart || !(apart < out_of_step);
-            error.lost = error.lost || std::isnan(apart);
-            if (i >= n) continue;
-            error.relative = std::fmax(error.relative, of_run * apart);
-            agree = agree && apart < momenta_alone;
-            any = true;
-        }
-        error.lost = error.lost || (is_apart && !(any && agree));
+        const Distance distance = distance_between(run_at(j), companion_at(j), parts_, amplitude, of_run);
+        error.relative = distance.relative;
+        error.lost = error.lost || distance.is_lost();
         largest = std::fmax(largest, error.relative);
     }
     if (largest > by_chance) error.relative = largest;
