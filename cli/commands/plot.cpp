@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 
@@ -46,11 +47,23 @@ std::vector<std::string> names_in(const std::string& list) {
     return names;
 }
 
+// Whether a column says again what x says, as the coordinate `time` of a clock does.
+bool repeats(const NumberTable::Column& x, const NumberTable::Column& column) {
+    double largest = 0, apart = 0;
+    for (std::size_t i = 0; i < x.values.size(); ++i) {
+        largest = std::fmax(largest, std::fabs(x.values[i]));
+        apart = std::fmax(apart, std::fabs(column.values[i] - x.values[i]));
+    }
+    return x.values.size() > 1 && apart <= 1e-9 * largest;
+}
+
 // All but x and the momenta, a panel each, as far as there is room: the energy last.
 std::vector<std::vector<std::string>> panels_of(const NumberTable& table, const std::string& x) {
     std::vector<std::vector<std::string>> panels;
     for (const NumberTable::Column& column : table.columns)
-        if (column.name != x && !column.name.starts_with("p_") && column.name != "H") panels.push_back({column.name});
+        if (column.name != x && !column.name.starts_with("p_") && column.name != "H" &&
+            !repeats(table.column(x), column))
+            panels.push_back({column.name});
     const bool has_energy = table.has("H") && x != "H";
     panels.resize(std::min(panels.size(), most_panels - (has_energy ? 1 : 0)));
     if (has_energy) panels.push_back({"H"});

@@ -94,7 +94,8 @@ std::string json_of_run(const PreparedRun& run, const TrajectoryRequest& request
           result.stop >= 0 ? Answer(watched[static_cast<std::size_t>(result.stop)].text) : Answer(nullptr)}});
     answer["events"] = Answer::array();
     for (std::size_t i = 0; i < watched.size(); ++i)
-        answer["events"].push_back({{"event", watched[i].text}, {"count", observers.counts[1 + i]}});
+        answer["events"].push_back(
+            {{"event", watched[i].text}, {"count", static_cast<std::int64_t>(observers.counts[1 + i])}});
     answer["state"] = {{"q", Answer::object()}, {"p", Answer::object()}};
     for (std::size_t k = 0; k < result.q.size() && k < scene.coordinates.size(); ++k) {
         answer["state"]["q"][scene.coordinates[k].written] = number(result.q[k]);
