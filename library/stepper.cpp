@@ -101,6 +101,8 @@ struct Stepper::Parts {
     // With a clock: where the scene's times are counted from, and a stop that the chain has met beyond the time now.
     double origin = 0;
     std::optional<EventHit> stop_ahead;
+    std::int64_t chain_steps = 0;  // since the start
+    std::vector<double> chain;     // t, q, p at the end of the last of them
 
     explicit Parts(const Kernel& of) : kernel(of), stepper(of.parts().kernel) {
         const TrajectoryRequest& start = kernel.parts().start;
@@ -114,7 +116,7 @@ struct Stepper::Parts {
     std::size_t n() const { return q.size(); }
     std::size_t columns() const { return 2 + 2 * static_cast<std::size_t>(stepper.kernel()->coordinates); }
 
-    // What to say of a step or a start that failed.
+    // What to say of a step or a start that failed; with a clock, where its chain of steps was.
     [[noreturn]] void fail(lobatto_status status, const lobatto_advance& call) const {
         TrajectoryRequest request = kernel.parts().start;
         request.parameters = parameters;
@@ -123,11 +125,18 @@ struct Stepper::Parts {
         request.p = p;
         TrajectoryResult result;
         result.status = status;
-        result.started = taken > 0;
+        result.started = taken > 0 || chain_steps > 0 || call.steps > 0;
         result.steps_done = taken;
+        result.chain_steps = chain_steps;
         result.time = time;
         result.q = q;
         result.p = p;
+        if (chain_steps > 0 && call.chain != nullptr) {
+            result.time = chain.front();
+            const auto middle = chain.begin() + 1 + std::ssize(q);
+            result.q.assign(chain.begin() + 1, middle);
+            result.p.assign(middle, chain.end());
+        }
         result.increment_failed = call.increment_failed;
         const Kernel::Parts& known = kernel.parts();
         TrajectoryRequest from_start = request;
@@ -144,7 +153,7 @@ struct Stepper::Parts {
         p.assign(momentum.begin(), momentum.end());
         start_q = q;
         last_step = 0;
-        taken = 0;
+        taken = chain_steps = 0;
         restart();
     }
     // Where no motion can begin, the stepper stays where it was.
@@ -219,6 +228,10 @@ struct Stepper::Parts {
         call.tolerance = kernel.parts().start.tolerance;
         call.interval = std::numeric_limits<double>::infinity();
         call.end = arrival;
+        if (is_clocked()) {
+            chain.resize(1 + 2 * n());
+            call.chain = chain.data();
+        }
         lobatto_status status = LOBATTO_OK;
         for (std::int64_t done = 0; done < steps && status == LOBATTO_OK; done += call.steps_done) {
             call.steps = steps - done;
@@ -229,6 +242,7 @@ struct Stepper::Parts {
             status = stepper.advance(call);
             keep_events(call.events_written);
             taken += call.steps_done;
+            chain_steps += call.chain_steps;
             if (status == LOBATTO_STOPPED && is_clocked() && arrival < found.back().t) {
                 stop_ahead = found.back();
                 status = LOBATTO_OK;

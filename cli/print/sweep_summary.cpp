@@ -151,7 +151,9 @@ std::string failures_text(const SweepStudy& study, const SweepTally& tally) {
         text += fmt::format("\n  trajectory {}, {}: {}", failure.index, study.starts().text_of(failure.index),
                             sweep_statuses[static_cast<std::size_t>(failure.status)]);
         if (failure.status < departed)
-            text += fmt::format(" in step {}, after t = {:.6g}", failure.steps_done + 1, failure.time);
+            text += study.scene().clock
+                        ? fmt::format(" after t = {:.6g}, the last of its times that it reached", failure.time)
+                        : fmt::format(" in step {}, after t = {:.6g}", failure.steps_done + 1, failure.time);
     }
     return text + "\nTry a smaller --step, or leave these values out.";
 }

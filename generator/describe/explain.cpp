@@ -60,8 +60,10 @@ std::string names_of(const Derivation& d, const std::vector<int>& coordinates) {
 std::string kind_of(const Derivation& derivation) {
     const System& system = derivation.system;
     std::string text;
-    const bool linear_terms = has_linear_terms(system);
-    if (holds_any(system.momentum_v, system.v))
+    const bool has_time = derivation.scene.has_time_coordinate(), linear_terms = !has_time && has_linear_terms(system);
+    if (has_time)
+        text = "In the time of the clock, where the physical time is a coordinate because the energy changes";
+    else if (holds_any(system.momentum_v, system.v))
         text = "Not quadratic in the velocities, as in relativity";
     else if (holds_any(system.momentum_v, system.q))
         text = "Quadratic in the velocities, with masses that depend on the position";
@@ -72,14 +74,12 @@ std::string kind_of(const Derivation& derivation) {
                             : "Kinetic minus potential energy, with constant masses";
     if (linear_terms && !holds_any(system.momentum_v, system.v))
         text += ", and with terms linear in the velocities, as in magnetic fields and rotating frames";
-    if (derivation.scene.has_time_coordinate())
-        text += ", in the clock's time, of which the time is a coordinate, because the energy changes";
-    else if (derivation.scene.clock)
-        text += ", in the clock's time";
+    if (derivation.scene.clock && !has_time) text += ", in the clock's time";
     if (!system.autonomous) text += "; t appears explicitly";
     std::vector<int> forced;
     for (std::size_t k = 0; k < system.outer_force.size(); ++k)
-        if (!system.outer_force[k].is_zero()) forced.push_back(static_cast<int>(k));
+        if (!system.outer_force[k].is_zero() && !(has_time && k + 1 == system.outer_force.size()))
+            forced.push_back(static_cast<int>(k));
     if (!forced.empty()) text += "; forces outside L act on " + names_of(derivation, forced);
     return text + ".";
 }

@@ -7,6 +7,7 @@
 
 #include "generator/emit/function_text.hpp"
 #include "generator/emit/support.hpp"
+#include "generator/graph/notation.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "generator/programs/identifier.hpp"
 
@@ -14,7 +15,8 @@ namespace lobatto {
 
 namespace {
 
-std::string remark_of(const Parameter& parameter) {
+std::string remark_of(const Scene& scene, const Parameter& parameter) {
+    if (scene.clock && parameter.symbol == scene.clock->energy) return "not of the scene: start() sets it";
     std::string remark = comment_safe(parameter.unit);
     if (!remark.empty()) remark = "[" + remark + "]";
     if (identifier(parameter.name) != parameter.name)  // C++ or <complex.h> has that name
@@ -31,6 +33,11 @@ std::string preamble(const Derivation& d, const KernelSource& source) {
         "// Written by Lobatto from a scene file; edit the scene, not this file. Formula numbers (D..): "
         "docs/derivation.md.\n//\n";
     text += wrapped("// Lagrangian   L = " + comment_safe(d.scene.lagrangian_text), "//                  ");
+    if (d.scene.clock)
+        text += wrapped(
+            "// Clock        dt = g dtau, g = " +
+                (d.scene.clock->is_automatic ? canonical_text(d.scene.clock->rate) : comment_safe(d.scene.clock->text)),
+            "//                  ");
     text +=
         fmt::format("// Method       {}: order {}, {}\n", d.quadrature.method.name(), d.quadrature.order(),
                     d.system.has_forces() ? "variational, with forces (Lagrange-d'Alembert)" : "symplectic, symmetric");
@@ -71,7 +78,7 @@ std::string parameters(const Scene& scene, Precision precision, Values values) {
         widest = std::max(widest, lines.back().size());
     }
     for (std::size_t i = 0; i < lines.size(); ++i) {
-        const std::string remark = values == Values::of_scene ? remark_of(scene.parameters[i]) : "";
+        const std::string remark = values == Values::of_scene ? remark_of(scene, scene.parameters[i]) : "";
         text += remark.empty()
                     ? fmt::format("        {}\n", lines[i])
                     : fmt::format("        {:<{}}  // {}\n", lines[i], std::min<std::size_t>(widest, 60), remark);

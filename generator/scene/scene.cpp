@@ -181,8 +181,8 @@ private:
             fail(at, "a clock is a formula of positions, parameters and the time, such as \"sqrt(x^2 + y^2)\"");
         const bool moves = std::any_of(scene_.coordinates.begin(), scene_.coordinates.end(),
                                        [&](const Coordinate& one) { return rate.expression.has(one.position); });
-        if (!rate.moves || !moves)
-            fail(at, "this clock holds no position, so that all its steps are equal; leave it out");
+        if (!rate.moves || !(moves || rate.expression.has(scene_.time)))
+            fail(at, "this clock holds no position and no time, so that all its steps are equal; leave it out");
         clock.rate = rate.expression;
         scene_.clock = clock;
     }

@@ -100,7 +100,7 @@ struct Clock {
     std::string text;                         // as written, white space collapsed: "r^(3/2)"
     GiNaC::ex rate;                           // g, in positions, time and parameters
     std::optional<Position> at;               // in the scene file; nothing: an option asked for it
-    GiNaC::symbol energy{"energy_of_start"};  // E; where the time is a coordinate the scale sigma of (D64)
+    GiNaC::symbol energy{"energy_of_start"};  // E; where the time is a coordinate, sigma of (D64), so called
     bool is_automatic = false;         // "auto": g follows from L (generator/mechanics/clock/automatic_clock.hpp)
     bool has_time_coordinate = false;  // the last one (generator/scene/time_coordinate.hpp)
     bool is_applied = false;           // the scene is one in tau

@@ -32,6 +32,7 @@ void add_time_coordinate(Scene& scene) {
     scene.initial_rate.emplace_back(scene.start == Start::velocity ? 1 : 0);  // kernels know the momentum at the start
     if (!scene.outputs.momenta_of_kept.empty()) scene.outputs.momenta_of_kept.emplace_back("p_" + name);
     scene.clock->has_time_coordinate = true;
+    scene.clock->energy = GiNaC::symbol("sigma_of_start");
 }
 
 Scene without_time_coordinate(Scene scene) {
@@ -41,6 +42,7 @@ Scene without_time_coordinate(Scene scene) {
     scene.initial_rate.pop_back();
     if (!scene.outputs.momenta_of_kept.empty()) scene.outputs.momenta_of_kept.pop_back();
     scene.clock->has_time_coordinate = false;
+    scene.clock->energy = Clock().energy;
     return scene;
 }
 

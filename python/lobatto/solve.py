@@ -118,7 +118,7 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
     """For users of scipy.integrate.solve_ivp: y holds positions, then velocities, 2n x times.
 
     ``t_span`` begins where the scene begins, at 0, and ends later. ``y0``: positions and velocities; None: those of the
-    scene. Steps are equal (setting ``step``); there is no tolerance: tune chooses a step for an error. Returns t, y, sol
+    scene. With a clock where the energy changes, the time is one coordinate more, the last; a start sets it. Steps are equal (setting ``step``); there is no tolerance: tune chooses a step for an error. Returns t, y, sol
     (with ``dense_output``), status, message, success, nfev (0: not counted). ``success`` says that all steps were taken.
     Whether the motion is right is what ``run`` measures and tells.
     """
@@ -137,7 +137,9 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
     if y0 is not None:
         y0 = numpy.asarray(y0, dtype=float)
         if y0.shape != (2 * n,):
-            raise InputError(f"y0 needs {2 * n} numbers: {n} positions, then {n} velocities")
+            more = y0.ndim == 1 and len(y0) == 2 * n - 2
+            raise InputError(f"y0 needs {2 * n} numbers: {n} positions, then {n} velocities"
+                             + ("; the last of each is that of the time, and any number will do" if more else ""))
         stepper.start(0.0, y0[:n], velocity=y0[n:])
     times, q, p, velocities, status, message = [0.0], [stepper.q.copy()], [stepper.p.copy()], [stepper.velocity], 0, ""
     try:

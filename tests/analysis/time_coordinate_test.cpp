@@ -225,6 +225,100 @@ TEST_CASE("rows of a sweep in explicit time are the ends of runs; the time itsel
     }
 }
 
+TEST_CASE("the kernel of a clock is the same in every process" * doctest::test_suite("slow")) {
+    // g is a product of powers, in an order that differs from one process to the next.
+    const std::string rest =
+        "\n[coordinates]\nx = { position = 0.45, velocity = 0.1 }\ny = { position = 0, velocity = 1.1 }\n[parameters]\n"
+        "m1 = 0.7\nm2 = 0.3\n[definitions]\nr = \"sqrt((x + m2*cos(t))^2 + (y + m2*sin(t))^2)\"\n"
+        "s = \"sqrt((x - m1*cos(t))^2 + (y - m1*sin(t))^2)\"\n[run]\nstep = 0.02\nuntil = 3\n[method]\npoints = 4\n";
+    const test::TemporaryFolder folder;
+    for (const std::string clock : {"auto", "r^(3/2)*s^(1/2)"}) {
+        test::write_text(folder / "scene.toml", "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 + m1/r + m2/s\"" + rest +
+                                                    "clock = \"" + clock + "\"\n");
+        std::string first;
+        for (int process = 0; process < 8; ++process) {
+            REQUIRE(test::run({LOBATTO_PROGRAM, "emit", folder / "scene.toml", "-o", folder / "out"}).exit_code == 0);
+            const std::string text = test::read_file(folder / "out/scene.hpp");
+            if (first.empty()) first = text;
+            CHECK(text == first);
+        }
+    }
+}
+
+TEST_CASE("the clock auto takes the sizes of poles, whatever sign a parameter gets") {
+    const std::string text =
+        "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 + k/sqrt(x^2 + y^2 + 0.01) + sin(t + phase)/sqrt((x - 3)^2 + y^2 "
+        "+ "
+        "0.01)\"\n[coordinates]\nx = { position = 0.5, velocity = 0 }\ny = { position = 0, velocity = 1.4 }\n[method]\n"
+        "points = 8\nclock = \"auto\"\n[run]\nstep = 0.05\nuntil = 6\n[parameters]\nphase = 1\n";
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "there.toml", text + "k = 1\n");
+    test::write_text(folder / "here.toml", text + "k = -1\n");
+    const auto end_of = [&](std::vector<std::string> arguments) {
+        arguments.insert(arguments.begin(), {LOBATTO_PROGRAM, "run"});
+        arguments.insert(arguments.end(), {"-o", folder / "run.csv", "--quiet"});
+        const test::Finished finished = test::run(arguments);
+        INFO(finished.err);
+        REQUIRE(finished.exit_code == 0);
+        return test::read_trajectory(folder / "run.csv").rows;
+    };
+    CHECK(end_of({folder / "there.toml", "--set", "k=-1"}) == end_of({folder / "here.toml"}));
+    // An amplitude that is 0 at the start counts as 1.
+    std::string still = text + "k = 1\n";
+    still.replace(still.find("phase = 1"), 9, "phase = 0");
+    test::write_text(folder / "still.toml", still);
+    CHECK(!end_of({folder / "still.toml"}).empty());
+}
+
+TEST_CASE("a clock may hold the time alone") {
+    const TrajectoryResult result = run(
+        scene_of("time = \"t\"\nlagrangian = \"(x'^2 - x^2)/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+                 "[method]\npoints = 6\nclock = \"1 + t\"\n[run]\nstep = 0.01\nuntil = 6\n"));
+    CHECK(result.q[0] == doctest::Approx(std::cos(6)).epsilon(1e-9));
+    CHECK(result.chain_steps == doctest::Approx(100 * std::log(7)).epsilon(0.02));
+}
+
+TEST_CASE("momenta that no velocity has, and singular masses, are refused with a clock too") {
+    const auto refusal = [](const std::string& lagrangian, const std::string& momentum) {
+        const std::string text =
+            "lagrangian = \"" + lagrangian + "\"\n[coordinates]\nx = { position = 1, momentum = " + momentum +
+            " }\ny = { position = 1, momentum = 1 }\n[forces]\ny = \"-y'\"\n[method]\nclock = \"auto\"\n"
+            "[run]\nstep = 0.01\nuntil = 1\n";
+        try {
+            derive(scene_of(text));
+        } catch (const InputError& error) {
+            return std::string(error.what());
+        }
+        return std::string("accepted");
+    };
+    CHECK(test::contains(refusal("x'^4/4 + y'^2/2 + 1/sqrt(x^2 + y^2)", "0"),
+                         "driven.toml:1:15: the mass matrix is singular"));
+    CHECK(test::contains(refusal("(x' + y')^2/2 + 1/sqrt(x^2 + y^2)", "1"),
+                         "driven.toml:1:15: the mass matrix is singular"));
+    CHECK(test::contains(refusal("sqrt(1 + x'^2) + y'^2/2 + 1/sqrt(x^2 + y^2)", "2"),
+                         "driven.toml:3:32: no velocity was found that has the momenta of the start"));
+}
+
+TEST_CASE("a stop at the end of a table counts steps, and looks as far as a step lasts") {
+    const test::TemporaryFolder folder;
+    std::string rows;
+    for (int i = 0; i <= 40; ++i) rows += fmt::format("{},{}\n", 0.1 * i, std::sin(0.1 * i));
+    test::write_text(folder / "table.csv", rows);
+    test::write_text(
+        folder / "scene.toml",
+        "time = \"t\"\nlagrangian = \"\"\"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2) + 0.1*x*table(\"table.csv\", t)\"\"\"\n"
+        "[coordinates]\nx = { position = 0.4, velocity = 0 }\ny = { position = 0, velocity = 2 }\n[method]\n"
+        "points = 6\nclock = \"auto\"\n[run]\nstep = 0.05\nuntil = 4\n");
+    const test::Finished finished =
+        test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv"});
+    CHECK(finished.exit_code == 3);
+    const std::size_t at = finished.out.find("steps ");
+    REQUIRE(at != std::string::npos);
+    const int steps = std::stoi(finished.out.substr(finished.out.find_first_of("0123456789", at)));
+    CHECK(test::contains(finished.err, fmt::format("the run stopped in step {}, after t = ", steps + 1)));
+    CHECK(test::contains(finished.err, "because steps with a clock go beyond the end of a run"));
+}
+
 TEST_CASE("tune takes a clock in explicit time where it is cheaper, and keeps its promise" *
           doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;

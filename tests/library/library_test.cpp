@@ -501,6 +501,37 @@ TEST_CASE("with a clock no stop and no event is lost between the times that are 
     CHECK(run.t[32] == doctest::Approx(pi).epsilon(1e-6));
 }
 
+TEST_CASE("with a clock a stepper tells where its steps stopped, as a run does") {
+    // A fall into the centre; and an escape before the first of the scene's times.
+    for (const auto& [speed, until] : {std::pair(0.0, 10.0), {2.2, 1e5}}) {
+        const lob::Scene scene = lob::Scene::from_text(
+            "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 + (1 + 0.2*sin(t))/r\"\n[definitions]\n"
+            "r = \"sqrt(x^2 + y^2)\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+            "y = { position = 0, velocity = " +
+                std::to_string(speed) +
+                " }\n[method]\npoints = 8\n"
+                "clock = \"r^(3/2)\"\n[run]\nstep = 0.3\nuntil = " +
+                std::to_string(until) + "\n",
+            "falls.toml");
+        std::string of_run, of_stepper;
+        try {
+            lob::run(scene);
+        } catch (const lob::RunFailure& failure) {
+            of_run = failure.what();
+        }
+        lob::Stepper stepper(lob::compile(scene));
+        try {
+            while (stepper.step()) {
+            }
+        } catch (const lob::ComputationError& error) {
+            of_stepper = error.what();
+        }
+        REQUIRE(!of_run.empty());
+        const std::size_t words = of_run.find(": ", of_run.find("the run stopped"));
+        CHECK(of_stepper.substr(0, words) == of_run.substr(0, words));
+    }
+}
+
 TEST_CASE("tune of the library chooses a clock where that is cheaper, and a run keeps the promise with it" *
           doctest::test_suite("slowest")) {
     const lob::Scene without = eccentric("", "0.02"), with = eccentric("clock = \"auto\"\n", "0.02");

@@ -27,6 +27,25 @@ std::optional<std::vector<double>> velocity_at_stop(const Kernel& kernel, const 
     return velocity;
 }
 
+// The clock's rate where a run stopped, 1 without a clock; nothing where it has no value.
+std::optional<double> rate_at_stop(const Scene& scene, const TrajectoryRequest& request,
+                                   const TrajectoryResult& result) {
+    if (!scene.clock) return 1;
+    std::vector<GiNaC::symbol> symbols;
+    for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
+    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
+    const std::optional<Tape> rate = Tape::of(in_clock_time(scene).clock->rate, symbols);
+    if (!rate) return std::nullopt;
+    std::vector<double> variables = request.parameters;
+    variables.insert(variables.end(), result.q.begin(), result.q.end());
+    return (*rate)(variables);
+}
+
+// The number of the step that failed.
+std::int64_t failed_step(const Scene& scene, const TrajectoryResult& result) {
+    return (scene.clock ? result.chain_steps : result.steps_done) + 1;
+}
+
 // t and q after so long with these velocities.
 std::vector<double> straight_on(const TrajectoryResult& result, const std::vector<double>& velocity, double time) {
     std::vector<double> ahead{result.time + time};
@@ -86,37 +105,31 @@ std::string root_at_switch(const Scene& scene, const std::vector<double>& veloci
                 "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: {}, line {} column {}, holds a "
                 "switch, {} a smooth formula that is positive everywhere, such as (sqrt(u^2 + 1e-12) + u)/2 for "
                 "max(u, 0).",
-                result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), condition.operation,
+                failed_step(scene, result), result.time, list_text(result.q), list_text(result.p), condition.operation,
                 condition.at.line, condition.at.column, missing);
         }
     return "";
 }
 
-// Of a step that failed because it would go beyond the ends of measured values. Empty: it would not.
-std::string end_of_table(const Domains& domains, const std::vector<double>& velocity, const TrajectoryRequest& request,
-                         const TrajectoryResult& result) {
-    std::vector<double> ahead = straight_on(result, velocity, request.step);
+// Of a step that failed because it would go beyond the ends of measured values. Empty: it would not. `lasts`: the step.
+std::string end_of_table(const Scene& scene, const Domains& domains, const std::vector<double>& velocity, double lasts,
+                         const TrajectoryRequest& request, const TrajectoryResult& result) {
+    std::vector<double> ahead = straight_on(result, velocity, lasts);
     ahead.insert(ahead.end(), result.p.begin(), result.p.end());
     const std::string what = domains.text(request.parameters, ahead.data());
     if (what.empty()) return "";
     return fmt::format(
         "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: at the end of the step {}, "
-        "and has no value there. Try an earlier end, or measure further.",
-        result.steps_done + 1, result.time, list_text(result.q), list_text(result.p), what);
+        "and has no value there. Try an earlier end{}, or measure further.",
+        failed_step(scene, result), result.time, list_text(result.q), list_text(result.p), what,
+        scene.clock ? ", because steps with a clock go beyond the end of a run, or equal steps (--clock none)" : "");
 }
 
 // Of a motion that escapes with a clock whose rate grows with the distance: the clock comes to infinity in a finite
 // time of its own, and steps grow beyond all bounds. Empty: it does not.
-std::string escape_of(const Scene& scene, const std::vector<double>& velocity, const TrajectoryRequest& request,
-                      const TrajectoryResult& result) {
-    std::vector<GiNaC::symbol> symbols;
-    for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
-    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
-    const std::optional<Tape> rate = Tape::of(in_clock_time(scene).clock->rate, symbols);
-    if (!rate) return "";
-    std::vector<double> variables = request.parameters;
-    variables.insert(variables.end(), result.q.begin(), result.q.end());
-    const double lasts = std::fabs(request.step) * (*rate)(variables);
+// `lasts`: a step there.
+std::string escape_of(const Scene& scene, const std::vector<double>& velocity, double lasts,
+                      const TrajectoryRequest& request, const TrajectoryResult& result) {
     double speed = 0, distance = 0, at_start = 0, outwards = 0;
     const std::size_t moving = velocity.size() - (scene.has_time_coordinate() ? 1 : 0);
     for (std::size_t k = 0; k < moving; ++k) {
@@ -143,9 +156,12 @@ std::string stopped_at_formula(const Scene& scene, const Domains& domains, const
     if (!has_failed || !(has_table || has_switch || scene.clock)) return "";
     const std::optional<std::vector<double>> velocity = velocity_at_stop(kernel, request, result);
     if (!velocity) return "";
-    std::string why = has_table ? end_of_table(domains, *velocity, request, result) : "";
+    const std::optional<double> rate = rate_at_stop(scene, request, result);
+    std::string why =
+        has_table && rate ? end_of_table(scene, domains, *velocity, request.step * *rate, request, result) : "";
     if (why.empty() && has_switch) why = root_at_switch(scene, *velocity, request, result);
-    if (why.empty() && scene.clock) why = escape_of(scene, *velocity, request, result);
+    if (why.empty() && scene.clock && rate)
+        why = escape_of(scene, *velocity, std::fabs(request.step * *rate), request, result);
     return why;
 }
 

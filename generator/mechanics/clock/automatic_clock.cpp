@@ -58,22 +58,40 @@ SymbolsOfMotion symbols_of_motion(const Scene& scene) {
     return symbols;
 }
 
+// The size of what holds parameters alone. Their values may change after this, and their signs: only masses are
+// positive.
+ex absolute(const ex& constant, const Symbols& masses) {
+    if (GiNaC::is_a<GiNaC::numeric>(constant)) return GiNaC::abs(GiNaC::ex_to<GiNaC::numeric>(constant));
+    if (GiNaC::is_a<GiNaC::mul>(constant)) {
+        ex product = 1;
+        for (const ex& factor : constant) product *= absolute(factor, masses);
+        return product;
+    }
+    if (GiNaC::is_a<GiNaC::power>(constant)) return GiNaC::pow(absolute(constant.op(0), masses), constant.op(1));
+    if (symbols_of(constant).empty()) return real_value(constant).is_negative() ? ex(-constant) : constant;
+    const bool is_mass =
+        std::any_of(masses.begin(), masses.end(), [&](const GiNaC::symbol& mass) { return constant.is_equal(mass); });
+    return is_mass ? constant : ex(GiNaC::sqrt(GiNaC::pow(constant, 2)));
+}
+
+// A term strength * shape, the shape a formula of positions, of degree -k.
 struct Pole {
-    ex term;
+    ex strength, shape;
     GiNaC::numeric degree;  // k of r^-k
 };
 
 // Of a term; nothing where it has none. A numerator may change its sign, where a clock would stop: r^d stands for one
-// of degree d. So may a factor that holds the time alone: it counts as at the start, or as 1.
-std::optional<Pole> pole_of(const ex& term, const Symbols& positions, const GiNaC::symbol& time) {
+// of degree d. So may a factor that holds the time alone: it counts as at the start, or as 1 if it is 0 there.
+std::optional<Pole> pole_of(const Scene& scene, const ex& term, const Symbols& positions) {
     GiNaC::numeric largest = 0, above = 0;
     ex constant = 1, numerator = 1, denominator = 1;
     const auto look = [&](const ex& factor) {
         const bool is_power = GiNaC::is_a<GiNaC::power>(factor) && GiNaC::is_a<GiNaC::numeric>(factor.op(1));
         const GiNaC::numeric exponent = is_power ? GiNaC::ex_to<GiNaC::numeric>(factor.op(1)) : 1;
         if (!holds(factor, positions)) {
-            const ex at_start = factor.subs(time == 0);
-            constant *= at_start.is_zero() ? ex(1) : at_start;
+            const ex at_start = factor.subs(scene.time == 0);
+            const bool vanishes = factor.has(scene.time) && scene.value_of(at_start).is_zero();
+            constant *= vanishes ? ex(1) : at_start;
         } else if (exponent.is_negative()) {
             denominator *= factor;
             largest = std::max(largest, -exponent * degree_of(factor.op(0), positions));
@@ -88,36 +106,8 @@ std::optional<Pole> pole_of(const ex& term, const Symbols& positions, const GiNa
         look(term);
     const GiNaC::numeric degree = largest - above;
     if (!degree.is_positive()) return std::nullopt;
-    return Pole{constant * (numerator.is_equal(1) ? denominator : ex(GiNaC::pow(denominator, degree / largest))),
-                degree};
+    return Pole{constant, numerator.is_equal(1) ? denominator : ex(GiNaC::pow(denominator, degree / largest)), degree};
 }
-
-// The terms of L that have one, without velocities; the least degree.
-struct Poles {
-    std::vector<ex> terms;
-    std::optional<GiNaC::numeric> least;
-};
-Poles poles_of(const Scene& scene) {
-    const auto [positions, velocities, motion] = symbols_of_motion(scene);
-    Poles poles;
-    for (const ex& term : terms_of(scene.lagrangian, motion)) {
-        const auto pole = holds(term, velocities) ? std::nullopt : pole_of(term, positions, scene.time);
-        if (!pole) continue;
-        if (!poles.least || pole->degree < *poles.least) poles.least = pole->degree;
-        poles.terms.push_back(pole->term);
-    }
-    return poles;
-}
-
-}  // namespace
-
-namespace {
-
-// T = c B^-m with B free of velocities, and how fast a motion is near it: omega^2 = weight B^-exponent.
-struct TimeScale {
-    ex strength, weight, base;  // c
-    GiNaC::numeric exponent;
-};
 
 // The masses, where they are constant, each of one coordinate.
 std::optional<std::vector<ex>> masses_of(const Scene& scene, const Symbols& velocities, const Symbols& motion) {
@@ -130,10 +120,47 @@ std::optional<std::vector<ex>> masses_of(const Scene& scene, const Symbols& velo
     return masses;
 }
 
+// The terms of L that have one, without velocities; the least degree; the other terms.
+struct Poles {
+    std::vector<Pole> terms;
+    std::optional<GiNaC::numeric> least;
+    std::vector<ex> others;
+    std::optional<std::vector<ex>> masses;
+    Symbols positive;  // masses that are parameters
+};
+Poles poles_of(const Scene& scene) {
+    const auto [positions, velocities, motion] = symbols_of_motion(scene);
+    Poles poles;
+    poles.masses = masses_of(scene, velocities, motion);
+    for (const ex& mass : poles.masses.value_or(std::vector<ex>()))
+        if (const ex one = mass.is_zero() ? mass : ex(mass / mass.integer_content()); GiNaC::is_a<GiNaC::symbol>(one))
+            poles.positive.push_back(GiNaC::ex_to<GiNaC::symbol>(one));
+    for (const ex& term : terms_of(scene.lagrangian, motion)) {
+        const auto pole = holds(term, velocities) ? std::nullopt : pole_of(scene, term, positions);
+        if (!pole) {
+            poles.others.push_back(term);
+            continue;
+        }
+        if (!poles.least || pole->degree < *poles.least) poles.least = pole->degree;
+        poles.terms.push_back({absolute(pole->strength, poles.positive), pole->shape, pole->degree});
+    }
+    return poles;
+}
+
+}  // namespace
+
+namespace {
+
+// T = c B^-m, c >= 0, with B free of velocities, and how fast a motion is near it: omega^2 = weight B^-exponent.
+struct TimeScale {
+    ex strength, weight, base;  // c
+    GiNaC::numeric exponent;
+};
+
 // omega^2 = grad T . M^-1 grad T / |T| = m^2 |c| kappa B^-(m + 1), where grad B . M^-1 grad B = kappa B, as for squares
 // of distances: kappa = 4 (1/m_i + 1/m_j). So a light body's encounters count as much as those of a heavy one.
-std::optional<TimeScale> time_scale_of(const ex& term, const Symbols& positions, const std::vector<ex>& masses) {
-    ex strength = 1, base = 0;
+std::optional<TimeScale> time_scale_of(const Pole& pole, const Symbols& positions, const std::vector<ex>& masses) {
+    ex strength = pole.strength, base = 0;
     GiNaC::numeric m = 0;
     const auto look = [&](const ex& factor) {
         if (!holds(factor, positions)) {
@@ -145,10 +172,10 @@ std::optional<TimeScale> time_scale_of(const ex& term, const Symbols& positions,
             base = 1;  // no such term
         }
     };
-    if (GiNaC::is_a<GiNaC::mul>(term))
-        for (const ex& factor : term) look(factor);
+    if (GiNaC::is_a<GiNaC::mul>(pole.shape))
+        for (const ex& factor : pole.shape) look(factor);
     else
-        look(term);
+        look(pole.shape);
     if (!m.is_positive() || !holds(base, positions)) return std::nullopt;
     ex steep = 0, kappa;
     bool is_first = true;
@@ -171,17 +198,46 @@ std::optional<TimeScale> time_scale_of(const ex& term, const Symbols& positions,
     return TimeScale{strength, strength * m * m * kappa, base, m + 1};
 }
 
-// Of all terms, or nothing.
-std::vector<TimeScale> time_scales_of(const Scene& scene, const std::vector<ex>& terms) {
+// How fast a motion is by each pole, and omega^2 of what is the same everywhere: springs and centrifugal forces, by the
+// trace of M^-1 d2L/dq dq, turning frames and uniform magnetic fields, by (d2L/dq_i dq'_j - d2L/dq_j dq'_i)^2 / m_i
+// m_j.
+struct TimeScales {
+    std::vector<TimeScale> poles;
+    ex everywhere = 0;
+};
+
+ex everywhere(const Scene& scene, const Poles& poles) {
+    const std::vector<ex>& masses = *poles.masses;
     const auto [positions, velocities, motion] = symbols_of_motion(scene);
-    const auto masses = masses_of(scene, velocities, motion);
-    std::vector<TimeScale> scales;
-    if (!masses) return scales;
-    for (const ex& term : terms) {
-        const std::optional<TimeScale> scale = time_scale_of(term, positions, *masses);
-        if (!scale) return {};
-        scales.push_back(*scale);
+    const std::vector<ex> slopes = gradient_of(poles.others, positions);
+    const auto is_constant = [&, &all = motion](const ex& value) {
+        return !holds(value, all) && !value.has(scene.time);
+    };
+    ex sum = 0;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        if (masses[i].is_zero()) continue;
+        const ex spring = slopes[i].diff(positions[i]) / masses[i];
+        if (is_constant(spring)) sum += absolute(spring, poles.positive);
+        for (std::size_t j = 0; j < i; ++j) {
+            if (masses[j].is_zero()) continue;
+            const ex turn = slopes[i].diff(velocities[j]) - slopes[j].diff(velocities[i]);
+            if (is_constant(turn)) sum += turn * turn / (masses[i] * masses[j]);
+        }
     }
+    return sum;
+}
+
+// Of all poles, or nothing.
+TimeScales time_scales_of(const Scene& scene, const Poles& poles) {
+    const Symbols positions = symbols_of_motion(scene).positions;
+    TimeScales scales;
+    if (!poles.masses) return scales;
+    for (const Pole& pole : poles.terms) {
+        const std::optional<TimeScale> scale = time_scale_of(pole, positions, *poles.masses);
+        if (!scale) return {};
+        scales.poles.push_back(*scale);
+    }
+    scales.everywhere = everywhere(scene, poles);
     return scales;
 }
 
@@ -192,9 +248,8 @@ bool agree_with_poles(const Scene& scene, const std::vector<TimeScale>& scales, 
     const double exponent = 1 / degree.to_double() + 0.5;
     double least = HUGE_VAL, most = 0;
     for (const TimeScale& scale : scales) {
-        const double strength = std::fabs(scene.value_of(scale.strength).to_double()),
-                     weight = std::fabs(scene.value_of(scale.weight).to_double()),
-                     ratio = std::pow(strength, exponent) / std::sqrt(weight);
+        const double ratio = std::pow(scene.value_of(scale.strength).to_double(), exponent) /
+                             std::sqrt(scene.value_of(scale.weight).to_double());
         if (scale.exponent != scales[0].exponent) return false;
         least = std::fmin(least, ratio);
         most = std::fmax(most, ratio);
@@ -235,22 +290,21 @@ ex automatic_clock(const Scene& scene) {
         fail_at_clock(scene,
                       "clock = \"auto\" looks for terms of the Lagrangian that grow without bound, such as 1/r, and "
                       "there is none; write a formula");
-    const auto signed_at_start = [&](const ex& term, const ex& formula) {
-        return scene.value_of(term.subs(start)).is_negative() ? ex(-formula) : formula;
-    };
     const auto at_start = [&](const ex& formula) { return rounded(formula.subs(start)); };
-    std::vector<TimeScale> scales = time_scales_of(scene, poles.terms);
-    if (scales.size() == 1) {  // a power of the base itself shares its roots with the potential
+    const auto [all_scales, everywhere] = time_scales_of(scene, poles);
+    std::vector<TimeScale> scales = all_scales;
+    if (scales.size() == 1 && everywhere.is_zero()) {  // a power of the base itself shares its roots with the potential
         const ex power = GiNaC::pow(scales[0].base, scales[0].exponent / 2);
         return power / at_start(power);
     }
-    if (agree_with_poles(scene, scales, *poles.least)) scales.clear();
-    ex sum = 0, sum_at_start = 0;
+    if (everywhere.is_zero() && agree_with_poles(scene, scales, *poles.least)) scales.clear();
+    ex sum = everywhere, sum_at_start = rounded(everywhere);
     for (std::size_t i = 0; i < poles.terms.size(); ++i) {
-        const ex term =
-            scales.empty() ? poles.terms[i] : scales[i].weight * GiNaC::pow(scales[i].base, -scales[i].exponent);
-        sum += signed_at_start(poles.terms[i], term);
-        sum_at_start += at_start(signed_at_start(poles.terms[i], term));
+        const ex shape = scales.empty() ? poles.terms[i].shape : GiNaC::pow(scales[i].base, -scales[i].exponent);
+        const ex size = scene.value_of(shape.subs(start)).is_negative() ? ex(-shape) : shape;
+        const ex term = (scales.empty() ? poles.terms[i].strength : scales[i].weight) * size;
+        sum += term;
+        sum_at_start += at_start(term);
     }
     const GiNaC::numeric half(1, 2);
     const GiNaC::numeric exponent = scales.empty() ? -(GiNaC::numeric(1) / *poles.least + half) : -half;

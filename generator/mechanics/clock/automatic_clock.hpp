@@ -6,9 +6,10 @@
 
 namespace lobatto {
 
-// g = (U(0) / U)^(1/k + 1/2) for U the sum of those terms, each with the sign that makes it positive at the start, and
-// k the least degree of their poles: near a pole r^-k a motion of that energy turns in a time r / sqrt(r^-k). 1 at the
-// start. InputError where no term has a pole.
+// 1 at the start, and in proportion to (Omega^2 + sum of omega^2)^(-1/2), the frequencies near each pole and those that
+// are the same everywhere (D65); or to U^-(1/k + 1/2) for U the sum of the terms, each with the sign that makes it
+// positive at the start, and k the least degree of their poles: near a pole r^-k a motion of that energy turns in a
+// time r / sqrt(r^-k). InputError where no term has a pole.
 GiNaC::ex automatic_clock(const Scene& scene);
 
 // Whether there is one, of a motion without constraints, cuts and inputs.

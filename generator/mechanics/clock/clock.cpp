@@ -27,18 +27,31 @@ bool is_broken_power(const ex& factor) {
     return GiNaC::is_a<GiNaC::power>(factor) && factor.op(1).info(GiNaC::info_flags::rational) &&
            !factor.op(1).info(GiNaC::info_flags::integer);
 }
-// Of a positive g: a broken power in it, which is positive like what stands beside it; 1 where there is none.
-ex broken_power_in(const ex& g) {
-    if (is_broken_power(g)) return g;
-    if (!GiNaC::is_a<GiNaC::mul>(g)) return 1;
-    const auto found = std::find_if(g.begin(), g.end(), is_broken_power);
-    return found == g.end() ? ex(1) : *found;
+// A positive g as a product: its broken powers, and the product of the rest, which is positive like them.
+struct Factors {
+    std::vector<ex> broken_powers;
+    ex rest = 1;
+};
+Factors factors_of(const ex& g) {
+    Factors factors;
+    const auto look = [&](const ex& factor) {
+        if (is_broken_power(factor))
+            factors.broken_powers.push_back(factor);
+        else
+            factors.rest *= factor;
+    };
+    if (GiNaC::is_a<GiNaC::mul>(g))
+        for (const ex& factor : g) look(factor);
+    else
+        look(g);
+    return factors;
 }
 // The power of a positive g; of one that holds a power itself, such as r^(3/2), one power and not two.
 ex power_of(const ex& g, const ex& exponent) {
-    const ex inner = broken_power_in(g);
-    if (inner.is_equal(1)) return GiNaC::pow(g, exponent);
-    return GiNaC::pow(inner.op(0), inner.op(1) * exponent) * GiNaC::pow(g / inner, exponent);
+    const Factors factors = factors_of(g);
+    ex result = GiNaC::pow(factors.rest, exponent);
+    for (const ex& inner : factors.broken_powers) result *= GiNaC::pow(inner.op(0), inner.op(1) * exponent);
+    return result;
 }
 
 // What is computed from values at the start; InputError where one is not finite and real.
@@ -155,12 +168,19 @@ private:
     void find_velocities() {
         const std::vector<ex> momentum = gradient_of(terms_of(scene_.lagrangian, motion_), v_);
         const SparseMatrix slopes = derivative_of(momentum, v_);
+        std::optional<bool> is_singular;  // from rest
         for (int exponent = 20; exponent >= -20; --exponent) {
             if (approach(momentum, slopes)) return;
+            if (!is_singular) is_singular = is_singular_;
             for (std::size_t k = 0; k < v_.size(); ++k)
                 rates_[k] = scene_.value_of(scene_.initial_rate[k]) * GiNaC::numeric(2).power(exponent);
         }
-        fail_at_clock(scene_, "no velocity was found that has the momentum at the start; give velocities");
+        if (*is_singular)
+            scene_.source.fail(scene_.lagrangian_at,
+                               "the mass matrix is singular where velocities were sought that have the momenta of the "
+                               "start; give velocities, start elsewhere, or give every direction a kinetic energy");
+        scene_.source.fail(scene_.coordinates[0].rate_at,
+                           "no velocity was found that has the momenta of the start; give velocities");
     }
     bool approach(const std::vector<ex>& momentum, const SparseMatrix& slopes) {
         constexpr int most_iterations = 60, most_halvings = 30;
@@ -179,7 +199,15 @@ private:
                     right(k, 0) = here->momentum[k];
                 }
                 step = mass.solve(unknown, right);
-            } catch (const std::exception&) {  // of a singular matrix, or where it has no value
+            } catch (const std::domain_error&) {  // the matrix has no value
+                return false;
+            } catch (const std::runtime_error&) {  // singular, and no step leads there
+                is_singular_ = iteration == 0;
+                return false;
+            }
+            for (unsigned k = 0; k < n; ++k) {
+                if (GiNaC::is_a<GiNaC::numeric>(step(k, 0))) continue;
+                is_singular_ = iteration == 0;
                 return false;
             }
             GiNaC::numeric length = 0, size = 0;
@@ -259,20 +287,23 @@ private:
     }
 
     const Scene& scene_;
-    ex g_, pace_;             // dt/dtau: g, or the velocity of the time
-    Symbols q_, v_, motion_;  // without the time's
-    std::vector<ex> rates_;   // dq/dt at the start
-    GiNaC::exmap moment_;     // t -> its coordinate, where it has one
-    GiNaC::exmap slower_;     // this, and v -> w / pace
+    ex g_, pace_;               // dt/dtau: g, or the velocity of the time
+    Symbols q_, v_, motion_;    // without the time's
+    std::vector<ex> rates_;     // dq/dt at the start
+    bool is_singular_ = false;  // the mass matrix, where velocities were sought first
+    GiNaC::exmap moment_;       // t -> its coordinate, where it has one
+    GiNaC::exmap slower_;       // this, and v -> w / pace
 };
 
 }  // namespace
 
 GiNaC::numeric pace_exponent(const ex& g) {
     const GiNaC::numeric third(1, 3);
-    const ex power = broken_power_in(g);
-    const bool has_root = !power.is_equal(1) && (4 * power.op(1) * third).info(GiNaC::info_flags::integer);
-    return has_root ? third : GiNaC::numeric(0);
+    const std::vector<ex> powers = factors_of(g).broken_powers;
+    const bool has_root = std::all_of(powers.begin(), powers.end(), [&](const ex& power) {
+        return (4 * power.op(1) * third).info(GiNaC::info_flags::integer);
+    });
+    return !powers.empty() && has_root ? third : GiNaC::numeric(0);
 }
 
 ex clock_rate(const Scene& scene) {

@@ -99,11 +99,15 @@ std::vector<Finding> scene_findings(const Scene& scene, const System& system) {
         findings.push_back({name, holds, reason});
     };
     find("no explicit time", system.autonomous,
-         system.autonomous ? "t appears nowhere, so no formula takes it"
-                           : "t appears in L, a force or an event, so every formula takes it");
+         !system.autonomous ? "t appears in L, a force or an event, so every formula takes it"
+         : scene.has_time_coordinate()
+             ? "t is a coordinate, " + scene.coordinates.back().name + ", so no formula takes it besides"
+             : "t appears nowhere, so no formula takes it");
     std::vector<int> driven;
     for (int k = 0; k < system.n; ++k)
-        if (!system.outer_force[static_cast<std::size_t>(k)].is_zero()) driven.push_back(k);
+        if (!system.outer_force[static_cast<std::size_t>(k)].is_zero() &&
+            !(scene.has_time_coordinate() && k + 1 == system.n))  // the momentum of the time takes their power
+            driven.push_back(k);
     find("no forces", driven.empty(),
          driven.empty() ? "all forces come from L, so every step is symplectic"
                         : "forces outside L act on " + names_of(system, driven) + ", so energy is gained or lost");
