@@ -34,11 +34,18 @@ constexpr double most_every = 9e15;  // the steps that a run can have
                 fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
 }
 
+// Before the equals sign, without blanks beside it: of "m = 2" it is m.
+std::string name_in(const std::string& argument) {
+    const std::string name = argument.substr(0, argument.find('='));
+    const std::size_t begin = name.find_first_not_of(' '), end = name.find_last_not_of(' ');
+    return begin == std::string::npos ? "" : name.substr(begin, end + 1 - begin);
+}
+
 void set_parameter(const std::string& argument, Scene& scene) {
     const Source source("--set", argument);
     const std::size_t equals = argument.find('=');
     if (equals == std::string::npos) source.fail({1, 1}, "expected name=value, such as --set m=2");
-    const std::string name = argument.substr(0, equals);
+    const std::string name = name_in(argument);
     const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(), [&](const Parameter& p) {
         return !p.is_side && (p.written == name || p.name == name);
     });
@@ -100,7 +107,7 @@ Text text_of(const std::string& argument, std::size_t begin, std::size_t end) {
 void apply(const Overrides& overrides, Scene& scene) {
     std::set<std::string> names;
     for (const std::string& argument : overrides.set) {
-        const std::string name = argument.substr(0, argument.find('='));
+        const std::string name = name_in(argument);
         if (!names.insert(name).second)
             throw InputError(fmt::format("--set: '{}' is set twice; leave one of both out", name));
         set_parameter(argument, scene);

@@ -9,6 +9,7 @@
 #include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/constraints/constraints.hpp"
 #include "generator/mechanics/constraints/impacts.hpp"
+#include "generator/mechanics/start.hpp"
 #include "generator/mechanics/system/system.hpp"
 
 namespace lobatto::api {
@@ -88,9 +89,15 @@ RoundoffResult roundoff_of(lobatto::Scene scene, const RoundoffRequest& request)
 }
 
 Proof proof_of(const Scene& scene, const Settings& settings, const Heard& say) {
-    refuse_values(settings, "verify");
+    Settings others = settings;
+    others.set.clear();
+    others.step.clear();
+    refuse_values(others, "verify");
+    lobatto::Scene chosen = scene.parts().scene;
+    apply(overrides_of(settings), chosen);
+    if (!settings.set.empty()) check_values(chosen);
     return prove(
-        scene.parts().scene, method_of(settings), say ? say : [](const std::string&, double) {});
+        std::move(chosen), method_of(settings), say ? say : [](const std::string&, double) {});
 }
 
 }  // namespace lobatto::api

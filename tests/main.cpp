@@ -88,6 +88,8 @@ constexpr const char* compiled_quickly[] = {
     "/analysis/tradeoff_test.cpp",
     "/analysis/time_coordinate_test.cpp",
     "/analysis/verdicts_test.cpp",
+    "/analysis/where_it_began_test.cpp",
+    "/cli/mistakes_test.cpp",
     "/cli/new_test.cpp",
     "/cli/run/columns_test.cpp",
     "/cli/run/many_digits_test.cpp",

@@ -345,7 +345,7 @@ std::string SweepStarts::text_of(std::int64_t trajectory, bool settings_alone) c
     std::string text;
     for (std::size_t c = 0; c < columns_.size(); ++c)
         if (!settings_alone || columns_[c].of.is_setting())
-            text += fmt::format("{}{} = {:.6g}", text.empty() ? "" : ", ", columns_[c].of.name, value(trajectory, c));
+            text += fmt::format("{}{} = {:.12g}", text.empty() ? "" : ", ", columns_[c].of.name, value(trajectory, c));
     return text;
 }
 

@@ -100,7 +100,7 @@ std::string method_text(const Choice& choice) {
 std::string stability_text(const Choice& choice) {
     const double radians = choice.step() * choice.frequency;
     if (std::isnan(choice.stability_limit))
-        return choice.clock.empty() ? "no linear limit is known with constraints or walls"
+        return choice.clock.empty() ? "no linear limit is known with constraints, walls or switches"
                                     : "no linear limit is known with a clock";
     if (!std::isfinite(choice.stability_limit)) return fmt::format("h omega = {:.3g}, stable for every step", radians);
     return fmt::format("h omega = {:.3g} of at most {:.4g}, omega the largest frequency met{}", radians,

@@ -20,6 +20,7 @@ namespace {
 struct VerifyOptions {
     std::string scene;
     MethodOption method;
+    Overrides overrides;
     bool json = false;
 };
 
@@ -42,7 +43,7 @@ void print(const std::vector<ProofRow>& rows, const Convergence& convergence) {
 
 void verify(const VerifyOptions& options) {
     Say say;
-    const Proof proof = api::proof_of(api::Scene(options.scene), settings_of(options.method),
+    const Proof proof = api::proof_of(api::Scene(options.scene), settings_of(options.method, options.overrides),
                                       [&](const std::string& what, double done) { say(what, done); });
     say.clear();
     if (options.json) {
@@ -64,6 +65,8 @@ void add_verify(CommandLine& program) {
     const auto options = std::make_shared<VerifyOptions>();
     command.option("SCENE", options->scene, "Scene file").required();
     options->method.add_to(command);
+    add_set_option(command, options->overrides);
+    add_step_option(command, options->overrides);
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto verify scenes/pendulum.toml --points 3");
     command.does([options] { verify(*options); });

@@ -107,6 +107,8 @@ void keep_foreign(const std::string& path, const std::string& given_mark) {
             fmt::format("{}: the name of this file has {} bytes, and at most {} are possible, for others are named "
                         "after it; choose a shorter name with -o",
                         path, bytes, longest_name));
+    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+    if (!folder.empty() && !std::filesystem::exists(folder, none)) fail_to_write("results", path, ENOENT);
     if (!std::filesystem::is_regular_file(path, none)) return;
     const std::string begin = begin_of(path), mark = given_mark.empty() ? mark_of(path) : given_mark;
     const auto holds = [&](const std::string& part) { return begin.find(part) != std::string::npos; };

@@ -174,8 +174,12 @@ std::string trajectory_text(const StabilityReport& report) {
             ? fmt::format(
                   "  no eigenvalue of a step is above 1 ({} steps examined){}\n", motion.looked_at,
                   report.derivation.system.autonomous ? "" : "; as forces change with time it may grow all the same")
-            : fmt::format("  an eigenvalue above 1, so that nearby trajectories diverge, in {} of {} steps examined\n",
-                          motion.parting, motion.looked_at);
+            : fmt::format("  an eigenvalue above 1{}, in {} of {} steps examined{}\n",
+                          report.derivation.system.autonomous ? ", so that nearby trajectories diverge" : "",
+                          motion.parting, motion.looked_at,
+                          report.derivation.system.autonomous
+                              ? ""
+                              : "; as forces change with time, that says nothing of the whole motion");
     if (motion.parting > 0)
         text += fmt::format("  fastest at t = {:.6g}: {} per step; the motion itself {}\n", motion.time,
                             growth_text(motion.rate), growth_text(motion.exact_rate));

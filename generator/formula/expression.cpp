@@ -62,7 +62,7 @@ public:
         if (!is_a<numeric>(value))
             fail(formula.at, frame,
                  fmt::format("{} must be known when the kernel is written: numbers, indices and parameters declared "
-                             "constant",
+                             "constant, such as n = {{ value = 8, constant = true }}",
                              what));
         const numeric number = ex_to<numeric>(value);
         if (!number.is_integer())

@@ -193,6 +193,7 @@ Syntax Parser::read_primary() {
                                 tokens_[next_ - 1].text));
     if (first.is(')') && next_ > 0 && tokens_[next_ - 1].is('(')) fail(first, "nothing stands between ( and )");
     if (first.is('[') || first.is('.') || first.is('\'')) fail_rest("");
+    if (first.is('=') && next_ > 0 && tokens_[next_ - 1].is('=')) fail(first, "write one =, not ==");
     fail(first, fmt::format("a number, a name or ( is missing before '{}'", first.text));
 }
 

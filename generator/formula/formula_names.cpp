@@ -168,10 +168,17 @@ void Parser::refuse_by_role(const Syntax& formula, std::string_view base) const 
         }
     }
     if (declared.empty())
-        fail(at, fmt::format("unknown name '{}' in {}: only numbers, pi and functions of them may stand here", shown,
-                             scope_.formula));
-    fail(at, fmt::format("unknown name '{}' in {}; declared: {}.{}", shown, scope_.formula, listing(declared),
-                         suggestion(name, near)));
+        fail(at,
+             fmt::format("unknown name '{}' in {}: only numbers, pi and functions of them may stand here; formulas of "
+                         "other names stand under [definitions]",
+                         shown, scope_.formula));
+    std::string advice = suggestion(name, near);
+    for (const std::string_view ending : {"_dot", "dot"}) {  // people's name for a velocity
+        const std::string of = name.ends_with(ending) ? name.substr(0, name.size() - ending.size()) : "";
+        if (std::find(declared.begin(), declared.end(), of + "'") != declared.end())
+            advice = fmt::format(" The velocity of {0} is written {0}'.", of);
+    }
+    fail(at, fmt::format("unknown name '{}' in {}; declared: {}.{}", shown, scope_.formula, listing(declared), advice));
 }
 
 [[noreturn]] void Parser::fail_time(const Token& at) const {

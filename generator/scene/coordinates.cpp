@@ -166,7 +166,8 @@ void SystemReader::read_values(const Group& group, const Entry& entry, const std
     const Syntax formula = parse_formula(source_, formula_of(source_, entry), scope);
     for (std::size_t k = 0; k < group.count; ++k) {
         values.push_back(evaluate(source_, formula, scope, {static_cast<long>(k + 1)}).expression);
-        value_in_range(source_, entry.value.at, values.back(), label(k), parameter_values_);
+        // As small as it is: the tails of a Gaussian pulse on a chain.
+        value_in_range(source_, entry.value.at, values.back(), label(k), parameter_values_, true);
     }
 }
 

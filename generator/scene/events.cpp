@@ -232,14 +232,19 @@ const std::vector<std::pair<std::string, Reduction::Of>> reductions = {
 }  // namespace
 
 void SystemReader::name_energy_and_momenta() {
-    const auto add = [&](const std::string& name, const GiNaC::symbol& symbol) {
-        if (names_.all.count(name) == 0) names_.add_parameter(name, {symbol});
+    const auto add = [&](const std::string& name, const std::vector<GiNaC::ex>& symbols, bool array = false) {
+        if (names_.all.count(name) == 0) names_.add_parameter(name, symbols, array);
     };
-    add("H", scene_.outputs.energy_of_kept);
+    add("H", {scene_.outputs.energy_of_kept});
+    std::map<std::string, std::vector<GiNaC::ex>> of_arrays;
     for (const Coordinate& coordinate : scene_.coordinates) {
-        scene_.outputs.momenta_of_kept.emplace_back("p_" + coordinate.name);
-        add("p_" + coordinate.name, scene_.outputs.momenta_of_kept.back());
+        const GiNaC::symbol momentum("p_" + coordinate.name);
+        scene_.outputs.momenta_of_kept.push_back(momentum);
+        add(momentum.get_name(), {momentum});
+        if (const std::string array = coordinate.array(); array != coordinate.written)
+            of_arrays["p_" + array].emplace_back(momentum);
     }
+    for (const auto& [name, momenta] : of_arrays) add(name, momenta, true);
 }
 
 void SystemReader::read_kept(const std::vector<std::string>& given) {

@@ -41,26 +41,33 @@ def _coordinate(name, value):
     return table
 
 
-def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=None, output=None, inputs=(), extra="",
-               **variables):
+def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=None, output=None, inputs=(),
+               definitions=None, extra="", **variables):
     """A scene from a Lagrangian and the values of its names.
 
     A name that stands in the Lagrangian with a prime, as q in ``m*q'^2/2``, is a coordinate. Its value is its initial
-    position, ``(position, velocity)``, or a table: ``dict(position=1, momentum=0, unit="m", force="-c*q'")``. Every
-    other name is a parameter: a number, a formula in a string (``"2*pi"``), or ``dict(value=1, unit="kg")``.
+    position, ``(position, velocity)``, or a table: ``dict(position=1, momentum=0, unit="m", force="-c*q'")``. An array
+    ``x[1]', x[2]', ...`` is a table with a count: ``dict(count=64, position="sin(i)", velocity=0)``, or with lists. Every
+    other name is a parameter: a number, a formula in a string (``"2*pi"``), or ``dict(value=1, unit="kg")``. A table
+    with a position is a coordinate, too, whose prime stands in a definition.
 
     ``time``: its name where it stands in the Lagrangian or a force, such as "t". ``method``: a table such as
     ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a scene file. ``inputs``: names of
-    parameters that ``Stepper.set`` may change before each step. ``extra``: more of a scene file, as text. Scenes with
-    arrays are written as such a text: ``Scene.from_text``.
+    parameters that ``Stepper.set`` may change before each step. ``definitions``: names of formulas, such as
+    ``{"r": "sqrt(x^2 + y^2)", "V[i]": "x[i]^4"}``. ``extra``: more of a scene file, as text; ``Scene.from_text`` takes a whole one.
     """
     if not isinstance(lagrangian, str):
         raise InputError(f"the Lagrangian is a text, such as \"m*q'^2/2 - k*q^2/2\", not {lagrangian!r}")
-    for name, table in ("method", method), ("output", output):
+    examples = {"method": "points=4", "output": "every=10", "definitions": "r='sqrt(x^2 + y^2)'"}
+    for name, table in ("method", method), ("output", output), ("definitions", definitions):
         if table is not None and not hasattr(table, "items"):
-            raise InputError(f"{name} is a table, such as {name}=dict({'points=4' if name == 'method' else 'every=10'}), "
+            raise InputError(f"{name} is a table, such as {name}=dict({examples[name]}), "
                              f"not {table!r}")
-    moving = set(re.findall(r"([A-Za-z_]\w*)'", re.sub("#[^\n]*", "", lagrangian)))  # without comments
+    formulas = [lagrangian, *(str(formula) for formula in (definitions or {}).values())]
+    moving = {name for formula in formulas
+              for name in re.findall(r"([A-Za-z_]\w*)(?:\[[^\]]*\])?'", re.sub("#[^\n]*", "", formula))}  # no comments
+    moving -= set(definitions or {})
+    moving |= {name for name, value in variables.items() if isinstance(value, dict) and "position" in value}
     lines = []
     if title:
         lines.append(f"title = {_value(title)}")
@@ -73,6 +80,9 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
         raise InputError(f"'{missing[0]}' stands in the Lagrangian as {missing[0]}', so it is a coordinate; give its "
                          f"start: Lagrangian(..., {missing[0]}=(position, velocity))")
     coordinates = {name: _coordinate(name, value) for name, value in coordinates.items()}
+    if definitions:
+        lines.append("[definitions]")
+        lines += [f"{_value(name)} = {_value(value)}" for name, value in definitions.items()]  # V[i] needs quotes
     forces = {name: table.pop("force") for name, table in coordinates.items() if "force" in table}
     for heading, table in ("coordinates", coordinates), ("forces", forces):
         if table:

@@ -33,15 +33,17 @@ def _table(rows):
 
 
 class _Rows:
-    """Columns by name."""
+    """Columns by name: x, p_x; of an array x[3], which is also x_3, or all of it, x."""
 
     def _index(self, name):
         names = [variable.name for variable in self.coordinates]
+        rows, name = self.q, re.sub(r"\[(\d+)\]$", r"_\1", name)
+        if name not in names and name.startswith("p_"):
+            rows, name = self.p, name[2:]
         if name in names:
-            return self.q, names.index(name)
-        if name.startswith("p_") and name[2:] in names:
-            return self.p, names.index(name[2:])
-        return None
+            return rows, names.index(name)
+        elements = [i for i, one in enumerate(names) if re.fullmatch(re.escape(name) + r"_\d+", one)]
+        return (rows, elements) if elements else None
 
     def __getitem__(self, name):
         found = self._index(name) if isinstance(name, str) else None

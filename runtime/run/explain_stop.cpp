@@ -64,8 +64,8 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
             }
             why =
                 "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
-                "potential, to a place where a mass vanishes or a function such as exp overflows, or away to infinity, "
-                "or the step is too long for the method to be stable";
+                "potential, to a place where a mass vanishes, exp overflows or a root gets a negative number, or away "
+                "to infinity, or the step is too long for the method to be stable";
             advice = smaller + more + ", an earlier end, or start elsewhere";
             break;
         case LOBATTO_SINGULAR_JACOBIAN:

@@ -48,6 +48,19 @@ def test_a_lagrangian_written_in_python_is_the_scene_of_the_same_text(pendulum):
         lobatto.Lagrangian("q'^2/2 - k*q", q=1)
 
 
+def test_a_lagrangian_may_hold_arrays_and_definitions():
+    chain = lobatto.Lagrangian("sum(i = 1 .. n, x[i]'^2/2) - sum(i = 1 .. n - 1, V[i])",
+                               definitions={"V[i]": "k*(x[i+1] - x[i])^2/2"}, k=2,
+                               x=dict(count="n", position="i", velocity="i^2"), n=dict(value=3, constant=True),
+                               step=0.01, until=1)
+    run = lobatto.run(chain)
+    assert numpy.array_equal(run["x[3]"], run.q[:, 2]) and numpy.array_equal(run["x"], run.q)
+    assert numpy.array_equal(run["p_x[2]"], run["p_x_2"]) and run["p_x"].shape == run.p.shape
+    assert numpy.allclose(run["p_x"].sum(axis=1), 14, rtol=1e-14)
+    polar = lobatto.Lagrangian("T + 1/r", definitions=dict(T="(r'^2 + r^2*phi'^2)/2"), r=(1, 0), phi=(0, 1.2), until=1)
+    assert numpy.allclose(lobatto.run(polar)["p_phi"], 1.2, rtol=1e-14)
+
+
 def test_scenes_and_runs_go_to_other_processes(pendulum):
     assert lobatto.Scene(SCENES / "pendulum.toml").text == pendulum.text  # a pathlib.Path
     again = pickle.loads(pickle.dumps(pendulum))

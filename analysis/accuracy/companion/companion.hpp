@@ -110,6 +110,7 @@ private:
     void look_at_paces(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& of_run,
                        const std::vector<double>& of_companion) const;
     MeasuredError compare(const TrajectoryResult& result) const;
+    void lose_where_it_began(MeasuredError& error, const std::vector<double>& amplitude, double of_run) const;
 
     Kernel kernel_;
     std::size_t parts_;   // of its numbers

@@ -139,6 +139,26 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     return shared;
 }
 
+// A wrong motion may grow, and its amplitude with it. When it began to be wrong is told by the amplitude until then.
+void Companion::lose_where_it_began(MeasuredError& error, const std::vector<double>& amplitude, double of_run) const {
+    constexpr double least = 1e-3;  // of the amplitude: what is less may be rounding
+    Range range;
+    for (std::size_t j = 0; time_after(request_, run_[j].steps) != *error.lost_after; ++j) {
+        const std::vector<double> here = row_at(j + 1);
+        for (const std::vector<double>& row :
+             {std::vector<double>(here.begin() + 1, here.end()), companion_ranges_[j].least, companion_ranges_[j].most})
+            if (!row.empty()) widen_to(range.least, range.most, row.data(), row.size());
+        std::vector<double> until_then = half_of(range.least, range.most);
+        for (std::size_t i = 0; i < amplitude.size(); ++i)
+            until_then[i] = std::fmin(amplitude[i], std::fmax(until_then[i], least * amplitude[i]));
+        const Distance distance =
+            distance_between(run_[j].row.data(), companion_[j].row.data(), parts_, until_then, of_run);
+        if (!distance.is_lost()) continue;
+        lose(error, here[0], {here.begin() + 1, here.end()});
+        return;
+    }
+}
+
 MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const std::size_t count = std::min(run_.size(), companion_.size());
     const std::vector<double> amplitude = amplitudes(count);
@@ -159,6 +179,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         course.emplace_back(std::fabs(error.until - request_.time), std::fmax(worst.relative, distance.apart));
         if (!error.lost_after && distance.is_lost()) lose(error, error.until, rounded(run_[j].row, parts_));
     }
+    if (error.lost_after) lose_where_it_began(error, amplitude, of_run);
     if (!error.lost_after && stopped && count > 0) {
         lose(error, *stopped, rounded(run_[count - 1].row, parts_));
     } else if (!error.lost_after && stopped) {

@@ -61,15 +61,15 @@ Domains::Domains(const Scene& scene, const SystemOutline& system)
         if (!tape) continue;
         const bool has_velocity = holds_any(written.expression, velocities);
         // Quotients that have no value at a single place have one beside it, as sin(q)/q.
-        const bool of_way = written.kind != Kind::nonzero && !has_velocity && holds_any(written.expression, moving) &&
-                            !kept.contains(written.expression);
+        const bool is_met = written.kind != Kind::nonzero && !has_velocity && holds_any(written.expression, moving),
+                   of_way = is_met && !kept.contains(written.expression);
         std::optional<Tape> exponent;
         if (written.kind == Kind::power && !(exponent = Tape::of(written.exponent, numbered))) continue;
         std::optional<Tape> argument;
         if (!written.argument.is_zero()) argument = Tape::of(scene.along_motion(written.argument), numbered);
         watches_ = watches_ || of_way;
-        conditions_.push_back(
-            {written, std::move(*tape), std::move(exponent), std::move(argument), has_velocity, of_way});
+        conditions_.push_back({written, std::move(*tape), std::move(exponent), std::move(argument), has_velocity,
+                               of_way, is_met && !of_way});
     }
 }
 
@@ -126,18 +126,29 @@ std::int64_t Domains::left_at(const std::vector<double>& parameters, const Recor
 
 std::string Domains::text(const std::vector<double>& parameters, const double* row) const {
     const std::vector<double> variables = variables_of(parameters, row);
-    for (const Condition& condition : conditions_) {
-        if (!condition.of_way || holds(condition, variables)) continue;
-        const DomainCondition& written = condition.written;
-        std::string operation = written.operation;  // "the table a.csv, which goes from 0 to 2,"
-        if (operation.ends_with(',')) operation.pop_back();
-        return condition.argument
-                   ? fmt::format("{}, line {} column {}, is asked for {} = {:.6g}", operation, written.at.line,
-                                 written.at.column, short_text(written.argument), (*condition.argument)(variables))
-                   : fmt::format("{}, line {} column {}, is of {} = {:.6g}", operation, written.at.line,
-                                 written.at.column, short_text(written.expression), condition.tape(variables));
-    }
+    for (const Condition& condition : conditions_)
+        if (condition.of_way && !holds(condition, variables)) return text(condition, variables);
     return "";
+}
+
+std::string Domains::text(const Condition& condition, const std::vector<double>& variables) {
+    const DomainCondition& written = condition.written;
+    std::string operation = written.operation;  // "the table a.csv, which goes from 0 to 2,"
+    if (operation.ends_with(',')) operation.pop_back();
+    return condition.argument
+               ? fmt::format("{}, line {} column {}, is asked for {} = {:.6g}", operation, written.at.line,
+                             written.at.column, short_text(written.argument), (*condition.argument)(variables))
+               : fmt::format("{}, line {} column {}, is of {} = {:.6g}", operation, written.at.line, written.at.column,
+                             short_text(written.expression), condition.tape(variables));
+}
+
+std::optional<Domains::NoValue> Domains::no_value_at(const std::vector<double>& parameters,
+                                                     const std::vector<double>& row) const {
+    const std::vector<double> variables = variables_of(parameters, row.data());
+    for (const Condition& condition : conditions_)
+        if ((condition.of_way || condition.ends_way) && !holds(condition, variables))
+            return NoValue{text(condition, variables), condition.argument.has_value()};
+    return std::nullopt;
 }
 
 }  // namespace lobatto

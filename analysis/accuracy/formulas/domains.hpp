@@ -28,6 +28,13 @@ public:
     // What has no value at a state that was left: "a square root, line 3 column 12, is of q - 3 = -0.1".
     std::string text(const std::vector<double>& parameters, const double* row) const;
 
+    // The same of a state that a kernel could not come to: of formulas too at which it stops by itself.
+    struct NoValue {
+        std::string text;
+        bool is_table = false;
+    };
+    std::optional<NoValue> no_value_at(const std::vector<double>& parameters, const std::vector<double>& row) const;
+
 private:
     struct Condition {
         DomainCondition written;
@@ -35,8 +42,10 @@ private:
         std::optional<Tape> exponent;  // of a power
         std::optional<Tape> argument;  // of a table
         bool has_velocity, of_way;     // of_way: kernels pass where it does not hold
+        bool ends_way;                 // they do not
     };
     bool holds(const Condition& condition, const std::vector<double>& variables) const;
+    static std::string text(const Condition& condition, const std::vector<double>& variables);
     std::vector<double> variables_of(const std::vector<double>& parameters, const double* row) const;
 
     std::vector<Condition> conditions_;

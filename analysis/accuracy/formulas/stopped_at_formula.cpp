@@ -111,18 +111,20 @@ std::string root_at_switch(const Scene& scene, const std::vector<double>& veloci
     return "";
 }
 
-// Of a step that failed because it would go beyond the ends of measured values. Empty: it would not. `lasts`: the step.
-std::string end_of_table(const Scene& scene, const Domains& domains, const std::vector<double>& velocity, double lasts,
-                         const TrajectoryRequest& request, const TrajectoryResult& result) {
-    std::vector<double> ahead = straight_on(result, velocity, lasts);
-    ahead.insert(ahead.end(), result.p.begin(), result.p.end());
-    const std::string what = domains.text(request.parameters, ahead.data());
-    if (what.empty()) return "";
+// Of a step that failed because it would go to where a formula has no value. Empty: it would not. `lasts`: the step.
+std::string leaves_domain(const Scene& scene, const Domains& domains, const std::vector<double>& velocity, double lasts,
+                          const TrajectoryRequest& request, const TrajectoryResult& result) {
+    const auto none = domains.no_value_at(request.parameters, straight_on(result, velocity, lasts));
+    if (!none) return "";
+    const std::string_view advice =
+        !none->is_table ? "an earlier end, or a formula that has a value there too, such as abs(x)^(5/2) for x^(5/2)"
+        : scene.clock   ? "an earlier end, because steps with a clock go beyond the end of a run, or equal steps "
+                          "(--clock none), or measure further"
+                        : "an earlier end, or measure further";
     return fmt::format(
-        "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: at the end of the step {}, "
-        "and has no value there. Try an earlier end{}, or measure further.",
-        failed_step(scene, result), result.time, list_text(result.q), list_text(result.p), what,
-        scene.clock ? ", because steps with a clock go beyond the end of a run, or equal steps (--clock none)" : "");
+        "the run stopped in step {}, after t = {:.6g}, from q = {}, p = {}: at the end of the step {}, and has no "
+        "value there. Try {}.",
+        failed_step(scene, result), result.time, list_text(result.q), list_text(result.p), none->text, advice);
 }
 
 // Of a motion that escapes with a clock whose rate grows with the distance: the clock comes to infinity in a finite
@@ -151,15 +153,13 @@ std::string escape_of(const Scene& scene, const std::vector<double>& velocity, d
 
 std::string stopped_at_formula(const Scene& scene, const Domains& domains, const Kernel& kernel,
                                const TrajectoryRequest& request, const TrajectoryResult& result) {
-    const bool has_table = !scene.tables.empty(), has_switch = !scene.switches.empty();
     const bool has_failed = result.status == LOBATTO_NOT_FINITE || result.status == LOBATTO_NOT_CONVERGED;
-    if (!has_failed || !(has_table || has_switch || scene.clock)) return "";
+    if (!has_failed || !result.started) return "";
     const std::optional<std::vector<double>> velocity = velocity_at_stop(kernel, request, result);
     if (!velocity) return "";
     const std::optional<double> rate = rate_at_stop(scene, request, result);
-    std::string why =
-        has_table && rate ? end_of_table(scene, domains, *velocity, request.step * *rate, request, result) : "";
-    if (why.empty() && has_switch) why = root_at_switch(scene, *velocity, request, result);
+    std::string why = scene.switches.empty() ? "" : root_at_switch(scene, *velocity, request, result);
+    if (why.empty() && rate) why = leaves_domain(scene, domains, *velocity, request.step * *rate, request, result);
     if (why.empty() && scene.clock && rate)
         why = escape_of(scene, *velocity, std::fabs(request.step * *rate), request, result);
     return why;

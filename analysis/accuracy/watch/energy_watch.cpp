@@ -79,6 +79,29 @@ cln::cl_R rounding_of(ExactEnergy& energy, const State& state, double steps) {
     return change;
 }
 
+// Kinetic energies at some times of a run, and at those where its energy error has doubled.
+struct KineticCourse {
+    double begin;
+    std::vector<std::pair<double, double>> some, leaving;  // time, energy
+
+    bool is_until(double end, double time) const { return std::fabs(time - begin) <= std::fabs(end - begin); }
+    // The start is no moment like others: it does not count. Nothing of a few.
+    std::optional<double> mean_until(double end) const {
+        double sum = 0;
+        int states = 0;
+        for (std::size_t i = 1; i < some.size(); ++i)
+            if (some[i].second > 0 && is_until(end, some[i].first)) sum += some[i].second, ++states;
+        return states >= fewest_states ? std::optional(sum / states) : std::nullopt;
+    }
+    double largest_until(double end) const {
+        double largest = 0;
+        for (const auto* course : {&some, &leaving})
+            for (const auto& [time, moving] : *course)
+                if (is_until(end, time)) largest = std::fmax(largest, moving);
+        return largest;
+    }
+};
+
 std::string why(const Scene& scene, double step, bool too_coarse) {
     const auto jump = std::find_if(scene.switches.begin(), scene.switches.end(),
                                    [&](const Switch& one) { return scene.lagrangian.has(one.side); });
@@ -170,22 +193,13 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
         return here && here->moving ? std::min(std::fabs(cln::double_approx(*here->moving)), most_energy) : 0;
     };
     std::vector<State> some;
-    std::vector<double> kinetic;
+    KineticCourse course{request.time, {}, {}};
     for (const std::vector<double>& row : rows_of_some()) {
         some.push_back(state_of(stepper, row, request.step));
-        kinetic.push_back(kinetic_of(some.back()));
+        course.some.emplace_back(row[0], kinetic_of(some.back()));
     }
-    // The start is no moment like others: it counts where there is nothing else.
-    const auto mean_until = [&](double time) -> std::optional<double> {
-        double sum = 0;
-        int states = 0;
-        for (std::size_t i = 1; i < some.size(); ++i)
-            if (kinetic[i] > 0 && std::fabs(some[i].time - request.time) <= std::fabs(time - request.time))
-                sum += kinetic[i], ++states;
-        return states >= fewest_states ? std::optional(sum / states) : std::nullopt;
-    };
     const auto start = energy_of(state_of(stepper, leaving_.front(), request.step));
-    const double mean = mean_until(HUGE_VAL).value_or(*std::max_element(kinetic.begin(), kinetic.end()));
+    const double mean = course.mean_until(HUGE_VAL).value_or(course.largest_until(HUGE_VAL));
     if (!start || !(mean > 0)) return "";
     const bool too_coarse = is_too_coarse(energy, some, request.step);
     struct Departure {
@@ -209,10 +223,14 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
         return std::nullopt;
     };
     if (!first_beyond([&](const State&) { return mean; })) return "";
-    // The mean of all may come from what is wrong; when that began is told by the mean until then.
+    // The mean of all may come from what is wrong; when that began is told by the mean until then, or of few states by
+    // the largest.
+    for (const std::vector<double>& row : leaving_)
+        course.leaving.emplace_back(row[0], kinetic_of(state_of(stepper, row, request.step)));
     const auto scale_at = [&](const State& state) {
-        const auto until_then = mean_until(state.time);
-        return until_then ? std::min(mean, std::max(*until_then, kinetic_of(state))) : mean;
+        const auto until_then = course.mean_until(state.time);
+        const double known = until_then ? std::max(*until_then, kinetic_of(state)) : course.largest_until(state.time);
+        return known > 0 ? std::min(mean, known) : mean;
     };
     const auto [state, error] = *first_beyond(scale_at);
     return fmt::format(

@@ -70,7 +70,15 @@ private:
                  "asked for: no structure is used, and all nodes of a step are solved for with full matrices");
             return;
         }
-        find("constant mass matrix", system_.constant_mass,
+        const auto& masses = system_.momentum_v.entries();
+        const bool only_momenta_move =
+            !system_.constant_mass && std::all_of(masses.begin(), masses.end(), [&](const auto& entry) {
+                const GiNaC::exset symbols = symbols_of(entry.second);
+                const auto holds = [&](const GiNaC::symbol& one) { return symbols.contains(one); };
+                return std::none_of(system_.q.begin(), system_.q.end(), holds) &&
+                       std::none_of(system_.v.begin(), system_.v.end(), holds) && !holds(system_.t);
+            });
+        find(only_momenta_move ? "momenta without positions" : "constant mass matrix", system_.constant_mass,
              system_.separable ? "M is the same everywhere, so the end of a step follows without equations"
              : system_.constant_mass
                  ? "M is the same everywhere, so multipliers are corrected without a matrix of all points of a step"

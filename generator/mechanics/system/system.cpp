@@ -36,6 +36,11 @@ void check_mass(const Scene& scene, const System& system) {
             if (!elimination.singular) break;
             if (const std::string dependent = equations.dependent_constraints(elimination); !dependent.empty())
                 scene.source.fail(system.constraints.front().at, dependent);
+            if (system.momentum_v.entries().empty())
+                refuse_lagrangian(scene,
+                                  "is degenerate: it is linear in the velocities, as phase-space and guiding-centre "
+                                  "Lagrangians are, whose momenta tell no velocity; write the motion with its kinetic "
+                                  "energy");
             refuse_lagrangian(
                 scene,
                 "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities "

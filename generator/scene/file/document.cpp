@@ -150,6 +150,10 @@ std::string explanation(std::string_view description) {
     const bool formula = description.find("could not determine value type") != std::string_view::npos ||
                          description.find("expected digit") != std::string_view::npos ||
                          description.starts_with("boolean");  // a word with f or t
+    // Of a word at the end of its line, as the value of time = t, it shows a part of the line's end.
+    const auto is_readable = [](unsigned char c) { return c >= ' ' && c < 0x7f; };
+    if (!std::all_of(description.begin(), description.end(), is_readable))
+        description = description.substr(0, description.find(", saw '"));
     const bool point = description.find("expected decimal digit, saw '.'") != std::string_view::npos;
     return fmt::format("not valid TOML: {}{}", description,
                        point     ? "; a number begins with a digit: write 0.5, not .5"

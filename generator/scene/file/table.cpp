@@ -5,10 +5,28 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "generator/formula/text/suggest.hpp"
 
 namespace lobatto {
+
+namespace {
+
+// What people of other programs call a key of [run].
+std::string advice_for(const std::string& key, const std::vector<std::string>& known, const std::string& table) {
+    static const std::map<std::string, std::string> others{
+        {"dt", "step"},     {"h", "step"},         {"timestep", "step"}, {"tend", "until"},
+        {"t_end", "until"}, {"tmax", "until"},     {"t_max", "until"},   {"end", "until"},
+        {"time", "until"},  {"duration", "until"}, {"t_final", "until"}, {"T", "until"}};
+    if (table == "[run]" && (key == "start" || key == "t0" || key == "begin" || key == "t_start"))
+        return " A run begins at t = 0: write t + 5 for t in the formulas to begin at 5.";
+    const auto found = others.find(key);
+    return table == "[run]" && found != others.end() ? fmt::format(" It is called {}.", found->second)
+                                                     : suggestion(key, known);
+}
+
+}  // namespace
 
 Table::Table(const Source& source, const std::vector<Entry>& entries, Position at, std::string name,
              const std::vector<Key>& keys, const std::vector<std::string>& allowed)
@@ -17,7 +35,7 @@ Table::Table(const Source& source, const std::vector<Entry>& entries, Position a
     for (const Entry& entry : entries_)
         if (std::find(known.begin(), known.end(), entry.key) == known.end())
             source_.fail(entry.at, fmt::format("unknown key '{}' in {}; known: {}.{}", entry.key.substr(0, 40), name_,
-                                               listing(known), suggestion(entry.key, known)));
+                                               listing(known), advice_for(entry.key, known, name_)));
 }
 
 const Entry* Table::find(const std::string& key) const {

@@ -116,13 +116,24 @@ private:
         }
     }
 
+    static constexpr int most_halvings = 20;
+    static bool has_values(const Arrays& a) { return is_finite(not_finite_part(a.g, r * Z)); }
+
     // Newton's iteration. At its end the slopes are carried to first order, which errs by the same e^2 as the unknowns.
     Status newton(Arrays& a) {
         real previous = Limits<real>::largest;
         for (int iteration = 1; iteration <= Rule::iteration_limit; ++iteration) {
             evaluate_nodes(this->time(), q, p, a.Y, a);
+            // Formulas may have no value there, as beyond the speed of light: half of the increment, and half of that.
+            for (int halving = 0; iteration > 1 && halving < most_halvings && !has_values(a); ++halving) {
+                for (int i = 0; i < N; ++i) {
+                    a.delta[i] *= real(0.5);
+                    a.Y[i] -= a.delta[i];
+                }
+                evaluate_nodes(this->time(), q, p, a.Y, a);
+            }
             if (iteration == 1) scale_kappas(a);
-            if (!is_finite(not_finite_part(a.g, r * Z))) return Status::not_finite;
+            if (!has_values(a)) return Status::not_finite;
             a.matrix.clear();
             assemble(a.H, entry_room, a.matrix);
             if (!a.matrix.factor())

@@ -359,12 +359,12 @@ TEST_CASE("errors in a sum say for which indices") {
 TEST_CASE("indices and bounds are whole numbers known when the kernel is written") {
     check_error_with_arrays("sum(i = 1 .. m, x[i])", 14,
                             "the last index of a sum must be known when the kernel is written: numbers, indices and "
-                            "parameters declared constant");
+                            "parameters declared constant, such as n = { value = 8, constant = true }");
     check_error_with_arrays("sum(i = half .. n, x[i])", 9, "the first index of a sum must be a whole number, not 0.5");
     check_error_with_arrays("x[n/2]", 3, "the index of x must be a whole number, not 1.5");
     check_error_with_arrays("x[q]", 3,
                             "the index of x must be known when the kernel is written: numbers, indices and parameters "
-                            "declared constant");
+                            "declared constant, such as n = { value = 8, constant = true }");
     check_error_with_arrays("x[10^9 + 1]", 3, "the index of x is beyond 1000000000");
     check_error_with_arrays("mod(3, 0)", 8, "mod divides by 0; it must be positive");
     check_error_with_arrays("mod(3/2, 2)", 5, "what mod divides must be a whole number, not 1.5");

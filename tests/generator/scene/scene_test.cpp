@@ -317,7 +317,8 @@ TEST_CASE("initial values, parameters, step and end time are finite real numbers
     check_error(3, "q = { position = \"1/(k - 4)\", velocity = 0 }", {3, 18},
                 "the initial position of q has no finite real value: it divides by zero");
     check_error(6, "k = \"2*m\"", {6, 8},
-                "unknown name 'm' in the value of k: only numbers, pi and functions of them may stand here");
+                "unknown name 'm' in the value of k: only numbers, pi and functions of them may stand here; formulas "
+                "of other names stand under [definitions]");
     check_error(6, "k = \"log(0)\"", {6, 6}, "the value of k has no finite real value here: log of 0 is not finite");
     check_error(6, "k = \"10^301\"", {6, 5}, "the value of k must be 0, or of a size between 1e-300 and 1e300");
     check_error(8, "step = 0", {8, 8}, "the step is 0; it must be positive");
@@ -457,7 +458,7 @@ TEST_CASE("lists, counts and elements that do not fit are refused") {
                          "count must be a whole number, not 2.5");
     check_error_of_chain(4, "x = { count = \"a\", position = 0, velocity = 0 }", {4, 16},
                          "count must be known when the kernel is written: numbers, indices and parameters declared "
-                         "constant");
+                         "constant, such as n = { value = 8, constant = true }");
     check_error_of_chain(4, "x = { count = 0, position = 0, velocity = 0 }", {4, 15},
                          "count is 0; at least 1 and at most 4096");
     check_error_of_chain(4, "x = { count = 4097, position = 0, velocity = 0 }", {4, 15},
@@ -482,7 +483,7 @@ TEST_CASE("lists, counts and elements that do not fit are refused") {
                          "there is no x[3]: the array has the elements x[1] to x[2] (i = 3)");
     check_error_of_chain(4, "x = { count = 3, position = \"1/(i - 2)\", velocity = 0 }", {4, 31},
                          "division by zero in the initial position of x[i] (i = 2)");
-    check_error_of_chain(4, "x = { count = 3, position = \"1e-200^i\", velocity = 0 }", {4, 29},
+    check_error_of_chain(4, "x = { count = 3, position = \"1e200^i\", velocity = 0 }", {4, 29},
                          "the initial position of x[2] must be 0, or of a size between 1e-300 and 1e300");
     const std::string array = with_line_of(with_line(1, "lagrangian = \"sum(k = 1 .. 2, m*q[k]'^2)*i\""), 3,
                                            "q = { count = 2, position = 0.5, velocity = \"i*m\" }");

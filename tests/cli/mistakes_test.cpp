@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Mistakes of newcomers, and what they are told.
+#include <doctest/doctest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/support.hpp"
+
+using namespace lobatto;
+
+namespace {
+
+std::string told(const std::string& scene, int exit_code = 2, std::vector<std::string> more = {}) {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", scene);
+    more.insert(more.begin(), {LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv"});
+    const test::Finished finished = test::run(more);
+    CHECK(finished.exit_code == exit_code);
+    return finished.err;
+}
+
+std::string oscillator(const std::string& lagrangian, const std::string& run, const std::string& rest = "",
+                       const std::string& first = "") {
+    return first + "lagrangian = \"" + lagrangian +
+           "\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n[run]\nuntil = 1\n" + run + "\n" + rest;
+}
+
+}  // namespace
+
+TEST_CASE("what other programs call otherwise is told by our name") {
+    CHECK(test::contains(told(oscillator("xdot^2/2 - x^2/2", "step = 0.1")), "The velocity of x is written x'."));
+    CHECK(test::contains(told(oscillator("x_dot^2/2 - x^2/2", "step = 0.1")), "The velocity of x is written x'."));
+    CHECK(test::contains(told(oscillator("x'^2/2 - x^2/2", "dt = 0.1")), "unknown key 'dt' in [run]"));
+    CHECK(test::contains(told(oscillator("x'^2/2 - x^2/2", "dt = 0.1")), "It is called step."));
+    CHECK(test::contains(told(oscillator("x'^2/2 - x^2/2", "step = 0.1\nt_end = 3")), "It is called until."));
+    CHECK(test::contains(told(oscillator("x'^2/2 - x^2/2", "step = 0.1\nstart = 5")), "A run begins at t = 0"));
+}
+
+TEST_CASE("what stands in the wrong place is told where it belongs") {
+    CHECK(test::contains(told(oscillator("x'^2/2 - x^2/2", "step = 0.1", "[output]\nevents = [\"x == 0\"]\n")),
+                         "write one =, not =="));
+    CHECK(test::contains(told(oscillator("x'^2/2 - E*x", "step = 0.1", "[parameters]\nE = \"cos(t)\"\n")),
+                         "formulas of other names stand under [definitions]"));
+    const std::string without_quotes = told(oscillator("x'^2/2 - x^2/2", "step = 0.1", "", "time = t\n"));
+    CHECK(test::contains(without_quotes, "expected 'true'; a formula must stand in quotes"));
+    CHECK(test::contains(told("lagrangian = \"sum(i = 1 .. n, x[i]'^2)\"\n[coordinates]\n"
+                              "x = { count = \"n\", position = 1, velocity = 0 }\n[parameters]\nn = 8\n[run]\n"
+                              "step = 0.1\nuntil = 1\n"),
+                         "such as n = { value = 8, constant = true }"));
+    CHECK(test::contains(told(oscillator("x'*1 - x^2/2", "step = 0.1")),
+                         "it is linear in the velocities, as phase-space and guiding-centre Lagrangians are"));
+}
+
+TEST_CASE("blanks beside the equals sign of --set do no harm; a missing folder is told at once") {
+    const std::string scene = oscillator("x'^2/2 - k*x^2/2", "step = 0.1", "[parameters]\nk = 1\n");
+    CHECK(told(scene, 0, {"--set", "k = 2"}).empty());
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", scene);
+    const test::Finished finished =
+        test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "no/run.csv"});
+    CHECK(finished.exit_code == 4);
+    CHECK(test::contains(finished.err, "Create its folder first"));
+    CHECK(finished.out.empty());
+}
+
+TEST_CASE("a step that leads to where a formula has no value says which, and where") {
+    const std::string text =
+        "lagrangian = \"x'^2/2 - x^2.5\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n[run]\nstep = 0.1\n"
+        "until = 5\n";
+    CHECK(test::contains(told(text, 3), "at the end of the step a broken power, line 1 column 25, is of x = -"));
+    CHECK(test::contains(told(text, 3), "such as abs(x)^(5/2) for x^(5/2)"));
+}
+
+TEST_CASE("a pulse on a chain may have tails below the range of numbers, and momenta of arrays have indices") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "chain.toml",
+                     "lagrangian = \"sum(i = 1 .. n, u[i]'^2/2) - sum(i = 1 .. n - 1, (u[i+1] - u[i])^2/2)\"\n"
+                     "[coordinates]\nu = { count = \"n\", position = \"exp(-(i - 32)^2)\", velocity = \"i\" }\n"
+                     "[parameters]\nn = { value = 64, constant = true }\n[run]\nstep = 0.1\nuntil = 1\n[output]\n"
+                     "keep = [\"min(sum(i = 1 .. n, p_u[i]))\", \"max(sum(i = 1 .. n, p_u[i]))\", \"last(p_u[3])\", "
+                     "\"last(p_u_3)\"]\n");
+    const test::Finished swept =
+        test::run({LOBATTO_PROGRAM, "sweep", folder / "chain.toml", "--vary", "u[1]'=1", "-o", folder / "sweep.csv"});
+    INFO(swept.err);
+    REQUIRE(swept.exit_code == 0);
+    const std::string table = test::read_file(folder / "sweep.csv");
+    const std::string row = table.substr(table.rfind("\n0,") + 1);
+    std::vector<double> numbers;
+    for (std::size_t at = 0; at != std::string::npos && at < row.size(); at = row.find(',', at)) {
+        if (row[at] == ',') ++at;
+        numbers.push_back(std::stod(row.substr(at)));
+    }
+    REQUIRE(numbers.size() >= 9);
+    CHECK(numbers[5] == doctest::Approx(64 * 65 / 2).epsilon(1e-13));
+    CHECK(numbers[6] == doctest::Approx(64 * 65 / 2).epsilon(1e-13));
+    CHECK(numbers[7] == numbers[8]);
+}
+
+TEST_CASE("verify proves a scene with other values") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", oscillator("m*x'^2/2 - x^4/4", "step = 0.1", "[parameters]\nm = 1\n"));
+    const test::Finished with = test::run(
+                             {LOBATTO_PROGRAM, "verify", folder / "scene.toml", "--set", "m=3", "--step", "0.05"}),
+                         without = test::run({LOBATTO_PROGRAM, "verify", folder / "scene.toml"});
+    CHECK(with.exit_code == 0);
+    CHECK(without.exit_code == 0);
+    CHECK(with.out != without.out);
+    CHECK(test::run({LOBATTO_PROGRAM, "verify", folder / "scene.toml", "--set", "m=0"}).exit_code == 2);
+}
