@@ -242,7 +242,9 @@ TEST_CASE("the clock auto knows the frequencies that are the same everywhere (D6
         {"3*(x'^2 + y'^2)/2 + 5*x*y' - 9*x^2/2 - 3*y^2 + 3/sqrt(x^2 + y^2)", 25.0 / 9 + 3 + 2},
         {"(x'^2 + y'^2)/2 + x*y^2 - y^4 + x^2*y*x' + 1/sqrt(x^2 + y^2)", 0},
     };
-    for (const auto& [lagrangian, quiet] : motions) {
+    for (const auto& motion : motions) {
+        const std::string lagrangian = motion.lagrangian;
+        const double quiet = motion.quiet;
         INFO(lagrangian);
         const Scene scene =
             scene_of(fmt::format("lagrangian = \"{}\"\n[coordinates]\nx = {{ position = 0.5, velocity = 0 }}\n"

@@ -73,8 +73,7 @@ private:
         const auto& masses = system_.momentum_v.entries();
         const bool only_momenta_move =
             !system_.constant_mass && std::all_of(masses.begin(), masses.end(), [&](const auto& entry) {
-                const GiNaC::exset symbols = symbols_of(entry.second);
-                const auto holds = [&](const GiNaC::symbol& one) { return symbols.contains(one); };
+                const auto holds = [&](const GiNaC::symbol& one) { return entry.second.has(one); };
                 return std::none_of(system_.q.begin(), system_.q.end(), holds) &&
                        std::none_of(system_.v.begin(), system_.v.end(), holds) && !holds(system_.t);
             });

@@ -262,7 +262,8 @@ TEST_CASE("each way to stop has its own explanation") {
     CHECK(explain_stop(result, request) ==
           where +
               "a position or momentum became infinite or not a number. The motion runs into a singularity of the "
-              "potential, to a place where a mass vanishes, exp overflows or a root gets a negative number, or away to infinity, "
+              "potential, to a place where a mass vanishes, exp overflows or a root gets a negative number, or away "
+              "to infinity, "
               "or the step is too long for the method to be stable. Try a smaller step, such as h = 0.25, an earlier "
               "end, or start elsewhere.");
     result.status = LOBATTO_SINGULAR_JACOBIAN;
