@@ -312,18 +312,20 @@ private:
         }
     }
 
+    // Of what is not small along the step.
     bool is_zero(const Sample& sample, int e) {
-        return is_wall(e) ? fabs(sample.value) <= slack[e - first_wall] : is_rounding(sample, e);
+        if (is_wall(e)) return fabs(sample.value) <= slack[e - first_wall];
+        real largest = real(0);
+        for (int i = 0; i < sample_count; ++i)
+            if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
+        return fabs(sample.value) <= Limits<real>::root_epsilon * largest && is_rounding(sample, e);
     }
     // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number, and of the
     // time, in which a position goes its way and a velocity changes.
     bool is_rounding(const Sample& sample, int e) {
         if (e < 0) __builtin_unreachable();  // what g++ would warn of
         if (!sample.is_exact) return false;
-        real largest = real(0), row[1 + 2 * n], velocity[n], values[K::events];
-        for (int i = 0; i < sample_count; ++i)
-            if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
-        if (!(fabs(sample.value) <= Limits<real>::root_epsilon * largest)) return false;
+        real row[1 + 2 * n], velocity[n], values[K::events];
         state_at(sample.theta, row);
         if (status == Status::ok) status = step->velocity(row[0], row + 1, row + 1 + n, velocity);
         if (status != Status::ok) return false;
@@ -377,9 +379,11 @@ private:
                 if (i == 0 && (is_first || step->event_begins[e]) && !is_wall(e)) last = real(0);
             } else {
                 if (changes(last, here.value)) {
+                    const int from = before >= 0 ? before : 0;
+                    // Of a constant, and of what holds identically, rounding alone changes the sign.
+                    if (!is_wall(e) && is_rounding(here, e) && is_rounding(samples[from], e)) continue;
                     const int direction = ((here.value > real(0)) == (step->step_size > real(0))) ? 1 : -1;
                     if (K::event_direction[e] * direction >= 0) {
-                        const int from = before >= 0 ? before : 0;
                         const bool is_exactly = zero >= 0 && samples[zero].value == real(0);
                         bool is_root = i > 0 || is_wall(e) || is_small_at_start(last);
                         const real root = is_beyond    ? until

@@ -139,6 +139,21 @@ TEST_CASE("a touch of zero is no event where rounding takes the function across"
         }
 }
 
+TEST_CASE("what is constant along the motion, but for rounding, makes no events") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "circle.toml",
+                     "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
+                     "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }\n[method]\npoints = 8\n"
+                     "[run]\nstep = 0.1\nuntil = 100\n[output]\n"
+                     "events = [\"x*x' + y*y' = 0\", \"x*y' - y*x' = 1\", \"y = 0 rising\"]\n");
+    const test::Finished done =
+        test::run({LOBATTO_PROGRAM, "run", folder / "circle.toml", "-o", folder / "run.csv", "--quiet"});
+    REQUIRE(done.exit_code == 0);
+    const auto events = test::read_trajectory(folder / "run.events.csv").rows;
+    CHECK(events.size() == 15);
+    for (const auto& row : events) CHECK(row[0] == 3);
+}
+
 // Whatever the step: events at the place where a step is cut, and touches there.
 TEST_CASE("an event where the motion goes through a switch is met once, and a touch there is none") {
     for (const double step : {0.1, 0.25, 0.07, 0.01}) {
