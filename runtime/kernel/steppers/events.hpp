@@ -318,17 +318,19 @@ private:
         real largest = real(0);
         for (int i = 0; i < sample_count; ++i)
             if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
-        return fabs(sample.value) <= Limits<real>::root_epsilon * largest && is_rounding(sample, e);
+        return sample.is_exact && fabs(sample.value) <= Limits<real>::root_epsilon * largest &&
+               is_rounding(sample.theta, e);
     }
     // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number, and of the
     // time, in which a position goes its way and a velocity changes.
-    bool is_rounding(const Sample& sample, int e) {
+    bool is_rounding(real theta, int e) {
         if (e < 0) __builtin_unreachable();  // what g++ would warn of
-        if (!sample.is_exact) return false;
         real row[1 + 2 * n], velocity[n], values[K::events];
-        state_at(sample.theta, row);
+        state_at(theta, row);
         if (status == Status::ok) status = step->velocity(row[0], row + 1, row + 1 + n, velocity);
         if (status != Status::ok) return false;
+        Formulas<K>::event(step->coefficients, row[0], row + 1, velocity, values);
+        const real value = values[e];
         real place[n], begin[n], end[n];  // velocities
         step->polynomial(real(0), place, begin);
         step->polynomial(real(1), place, end);
@@ -343,9 +345,9 @@ private:
             number += few * (fabs(number) > way ? number : way);
             Formulas<K>::event(step->coefficients, row[0], row + 1, velocity, values);
             number = before;
-            if (is_finite(values[e])) change += fabs(values[e] - sample.value);
+            if (is_finite(values[e])) change += fabs(values[e] - value);
         }
-        return fabs(sample.value) <= change;
+        return fabs(value) <= change;
     }
 
     // Whether a change of sign between two steps, from this value to that of the first sample, is a zero: the state
@@ -381,7 +383,7 @@ private:
                 if (changes(last, here.value)) {
                     const int from = before >= 0 ? before : 0;
                     // Of a constant, and of what holds identically, rounding alone changes the sign.
-                    if (!is_wall(e) && is_rounding(here, e) && is_rounding(samples[from], e)) continue;
+                    if (!is_wall(e) && is_rounding(here.theta, e) && is_rounding(samples[from].theta, e)) continue;
                     const int direction = ((here.value > real(0)) == (step->step_size > real(0))) ? 1 : -1;
                     if (K::event_direction[e] * direction >= 0) {
                         const bool is_exactly = zero >= 0 && samples[zero].value == real(0);
