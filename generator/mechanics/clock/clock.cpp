@@ -270,7 +270,7 @@ private:
         const GiNaC::numeric energy = moving - at_start(scene_.lagrangian);
         if (!scene_.has_time_coordinate()) return energy;
         const GiNaC::numeric size = GiNaC::abs(moving / 2) + GiNaC::abs(energy - moving / 2);
-        return size.is_zero() ? GiNaC::numeric(1) : size / 2 * at_start(power_of(g_, 1 - pace_exponent(g_)));
+        return (size.is_zero() ? GiNaC::numeric(1) : size / 2) * at_start(power_of(g_, 1 - pace_exponent(g_)));
     }
 
     // Of a term that is homogeneous in the velocities: so that g need not be divided by and multiplied with again.
