@@ -3,13 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "generator/describe/explain.hpp"
 #include "generator/emit/tables.hpp"
 #include "generator/pipeline.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -63,10 +63,10 @@ std::vector<CheckedOutput> outputs_of(const Derivation& derivation, long operati
 
 Checked check_scene(Scene scene, bool general) {
     Checked result;
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     result.derivation = derive(scene, general);
     result.operations = operations_of(emit(result.derivation));
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    result.seconds = watch.seconds();
     scene.method.arithmetic = StepArithmetic::plain;                          // which the general path has alone
     const bool alone = general || result.derivation.structure.is_explicit();  // which have no other path
     result.without = alone ? result.derivation : derive(scene, true);

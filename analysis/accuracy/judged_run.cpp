@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -14,6 +13,7 @@
 #include "analysis/stability/linear_departure.hpp"
 #include "generator/mechanics/clock/automatic_clock.hpp"
 #include "generator/mechanics/start.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -106,7 +106,7 @@ std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request,
 }  // namespace
 
 PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, std::optional<Method> companion) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     if (scene.clock && scene.method.numbers != Precision::double_)
         fail_at_clock(scene, "with a clock `lobatto run` computes in double, but numbers are \"" +
                                  precision_name(scene.method.numbers) +
@@ -126,7 +126,7 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, s
     KernelSource in_double, in_finer;
     if (numbers != Precision::double_) in_double = source_in(Precision::double_, scene.method);
     if (companion) in_finer = source_in(companion->numbers, *companion);
-    const std::chrono::duration<double> derivation_time = std::chrono::steady_clock::now() - start;
+    const double derivation_seconds = watch.seconds();
     apply(overrides, scene);  // after the derivation: one kernel serves all values
     if (!overrides.set.empty()) check_values(scene);
     const Steps steps = steps_of_run(scene, overrides);
@@ -135,8 +135,8 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, s
     const Kernel plain = numbers == Precision::double_ ? kernel : kernel_of(in_double, Precision::double_);
     std::optional<Kernel> finer;
     if (companion) finer = kernel_of(in_finer, companion->numbers);
-    return {scene, derived.outline, derived.from_cache,     derived.source, compiled, kernel, plain,
-            finer, steps,           derivation_time.count()};
+    return {scene, derived.outline, derived.from_cache, derived.source, compiled, kernel, plain,
+            finer, steps,           derivation_seconds};
 }
 
 namespace {

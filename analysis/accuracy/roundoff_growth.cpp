@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -17,6 +16,7 @@
 #include "analysis/kernel/kernel_of.hpp"
 #include "generator/pipeline.hpp"
 #include "runtime/error.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -65,9 +65,9 @@ public:
     void advance(std::int64_t steps) {
         lobatto_advance call{};
         call.steps = steps;
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch watch;
         succeed(stepper_.advance(call));
-        seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        seconds += watch.seconds();
         iterations += call.iterations;
         taken += steps;
     }

@@ -76,8 +76,7 @@ double end_of(const Scene& scene) {
 }
 
 Experiment::Experiment(const Scene& written, const Scene& scene, ExperimentRequest request)
-    : began_(std::chrono::steady_clock::now()),
-      scene_(without_time_coordinate(scene)),
+    : scene_(without_time_coordinate(scene)),
       request_(std::move(request)),
       start_(scene_),
       kernels_(written, scene, request_.tries_clocks),
@@ -221,7 +220,7 @@ double Experiment::fewest_stable_steps(const Member& member) const {
 }
 
 double Experiment::elapsed() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+    return watch_.seconds();
 }
 
 void Experiment::check_interruption() const {

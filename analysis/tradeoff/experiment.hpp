@@ -2,7 +2,6 @@
 // All that measuring a scene needs, brought together: its kernels, its reference, a store, a clock.
 #pragma once
 
-#include <chrono>
 #include <functional>
 #include <limits>
 #include <map>
@@ -12,6 +11,7 @@
 #include "analysis/tradeoff/kernel_builder.hpp"
 #include "analysis/tradeoff/measurement_store.hpp"
 #include "analysis/tradeoff/measuring.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -79,7 +79,7 @@ private:
     bool varies(StepClock clock) const;
     void find_span(StepClock clock);
 
-    std::chrono::steady_clock::time_point began_;
+    Stopwatch watch_;
     Scene scene_;
     ExperimentRequest request_;
     ExactStart start_;

@@ -4,23 +4,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
 
 #include "runtime/measure/extrapolation.hpp"
 #include "runtime/measure/frequency.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // Numbers with many divisors, so that many numbers of steps meet many of the samples.
 constexpr int sample_counts[] = {2520, 840, 360, 120, 60};
@@ -50,7 +44,7 @@ template <class real>
 class Computation {
 public:
     Computation(const Kernel& kernel, const ExactStart& start, const ReferenceRequest& request)
-        : kernel_(kernel), request_(request), began_(Clock::now()), stepper_(kernel) {
+        : kernel_(kernel), request_(request), stepper_(kernel) {
         n_ = static_cast<std::size_t>(kernel->coordinates);
         const auto step = static_cast<real>(request.until / 1000);
         start_ = start_in<real>(start, kernel, step);
@@ -65,10 +59,10 @@ public:
         observe();
         const double tolerance = tolerance_for(reference_.precision, request_.wanted);
         reference_.tolerance = tolerance;
-        const auto began = Clock::now();
+        const Stopwatch watch;
         const auto states = extrapolate(reference_.samples, static_cast<real>(tolerance), false);
         if (!states) throw ComputationError("the reference fails: its steps become too short");
-        const double took = seconds_since(began);
+        const double took = watch.seconds();
         keep(*states);
         reference_.disagreement.assign(static_cast<std::size_t>(reference_.samples) + 1,
                                        std::numeric_limits<double>::infinity());
@@ -78,7 +72,7 @@ public:
         if (reference_.first.empty())
             throw ComputationError("the reference fails: the steps of " + std::string(kernel_->method) +
                                    " do not converge on this motion, however short");
-        reference_.seconds = seconds_since(began_);
+        reference_.seconds = watch_.seconds();
         return std::move(reference_);
     }
 
@@ -120,13 +114,13 @@ private:
         for (real& value : scale_)
             if (!(value > real(1e-6))) value = real(1);
         const int samples = sample_counts[std::size(sample_counts) - 2];
-        const auto began = Clock::now();
+        const Stopwatch watch;
         auto states = extrapolate(samples, static_cast<real>(rough), true);
         if (states && hardly_moves_) states = extrapolate(samples, static_cast<real>(fine), true);
         if (!states)
             throw ComputationError(
                 "the motion cannot be followed to the end: it runs into a singularity, or away to infinity");
-        const double seconds = seconds_since(began);
+        const double seconds = watch.seconds();
         set_frequency(*states, samples);
         // At least one macro step of some twenty slopes a sample.
         const double at_least = 40 * seconds / static_cast<double>(std::max<std::int64_t>(evaluations_, 1));
@@ -158,9 +152,9 @@ private:
             return 0;
         lobatto_advance call{};
         call.steps = 2;
-        const auto began = Clock::now();
+        const Stopwatch watch;
         stepper_.advance(call);
-        return seconds_since(began) / static_cast<double>(call.steps);
+        return watch.seconds() / static_cast<double>(call.steps);
     }
 
     real step_of_family() const {
@@ -177,7 +171,7 @@ private:
             check_interruption();
             if (!way.advance_to(static_cast<real>(request_.until) * real(i) / real(samples))) return std::nullopt;
             states.insert(states.end(), way.state().begin(), way.state().end());
-            if (seconds_since(began_) > (quick ? half : overtime) * request_.seconds_limit)
+            if (watch_.seconds() > (quick ? half : overtime) * request_.seconds_limit)
                 fail_slow(static_cast<double>(way.time()) / (quick ? precise_factor : 1));
         }
         evaluations_ = way.evaluations();
@@ -266,7 +260,7 @@ private:
         const real h = static_cast<real>(request_.until) / static_cast<real>(samples * ratio);
         if (stepper_.prepare(start_.parameters, h) != LOBATTO_OK || stepper_.start(0, start_.q, start_.p) != LOBATTO_OK)
             return std::nullopt;
-        const auto began = Clock::now();
+        const Stopwatch watch;
         std::vector<real> row, p;
         return largest_differences(states, [&](int) -> const std::vector<real>* {
             check_interruption();
@@ -276,7 +270,7 @@ private:
             real time;
             stepper_.state(time, row, p);
             covered_ = static_cast<double>(time);
-            reference_.is_late = seconds_since(began) > limit;
+            reference_.is_late = watch.seconds() > limit;
             if (reference_.is_late) return nullptr;
             row.insert(row.end(), p.begin(), p.end());
             return &row;
@@ -293,13 +287,13 @@ private:
         reference_.is_late = expected > far_dearer * std::fmax(extrapolation_seconds, request_.seconds_limit / 4);
         if (reference_.is_late) return;
         for (int refinement = 0; refinement <= most_refinements; ++refinement, ratio *= 2) {
-            const double left = request_.seconds_limit - seconds_since(began_) - extrapolation_seconds;
+            const double left = request_.seconds_limit - watch_.seconds() - extrapolation_seconds;
             reference_.is_late = refinement > 0 && 2 * last > left;
             if (reference_.is_late) break;
-            const auto began = Clock::now();
+            const Stopwatch watch;
             const auto measured =
                 disagreement_with(states, ratio, std::fmax(left, request_.seconds_limit * (overtime - 1)));
-            last = seconds_since(began);
+            last = watch.seconds();
             const double before = reference_.disagreement.back();
             if (!measured && reference_.is_late) break;
             const double now = measured ? measured->back() : std::numeric_limits<double>::infinity();
@@ -313,7 +307,7 @@ private:
     // Equal steps of the family that resolve a close encounter may take too long: the same extrapolation, less precise,
     // until it is another one.
     void compare_with_looser(const States& states, double tolerance, double extrapolation_seconds) {
-        if (seconds_since(began_) + extrapolation_seconds > overtime * request_.seconds_limit) return;
+        if (watch_.seconds() + extrapolation_seconds > overtime * request_.seconds_limit) return;
         std::optional<States> others;
         try {
             others = extrapolate(reference_.samples, static_cast<real>(tolerance), false);
@@ -342,7 +336,7 @@ private:
 
     Kernel kernel_;
     const ReferenceRequest& request_;
-    Clock::time_point began_;
+    Stopwatch watch_;
     LoadedStepper<real> stepper_;
     std::size_t n_ = 0;
     StartIn<real> start_;

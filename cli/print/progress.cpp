@@ -21,15 +21,14 @@ std::string time_text(double seconds) {
 
 }  // namespace
 
-Progress::Progress(std::int64_t total)
-    : total_(total), on_terminal_(isatty(STDERR_FILENO) == 1), start_(std::chrono::steady_clock::now()) {}
+Progress::Progress(std::int64_t total) : total_(total), on_terminal_(isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() {
     if (shown_) tell("\r\033[K");
 }
 
 void Progress::show(std::int64_t done) {
-    const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    const double elapsed = watch_.seconds();
     if (!on_terminal_ || elapsed < 1 || done <= 0) return;
     shown_ = true;
     constexpr int width = 40;

@@ -2,8 +2,9 @@
 // A progress bar for people who wait: only on a terminal, only after a second.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
+
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -20,7 +21,7 @@ private:
     std::int64_t total_;
     bool on_terminal_;
     bool shown_ = false;
-    std::chrono::steady_clock::time_point start_;
+    Stopwatch watch_;
 };
 
 }  // namespace lobatto

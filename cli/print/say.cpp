@@ -9,13 +9,12 @@
 
 namespace lobatto {
 
-Say::Say(double seconds)
-    : on_terminal_(isatty(STDERR_FILENO) == 1), seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
+Say::Say(double seconds) : on_terminal_(isatty(STDERR_FILENO) == 1), seconds_(seconds) {}
 
 void Say::operator()(const std::string& what, double done) {
     if (!on_terminal_) return;
     shown_ = true;
-    const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    const double elapsed = watch_.seconds();
     std::string left;
     if (done > 0 && elapsed * (1 - done) > done)
         left = fmt::format(" (about {:.0f} s left)", elapsed * (1 - done) / done);

@@ -2,8 +2,9 @@
 // What is being done right now, on one line of the terminal that is written over; nothing where no one watches.
 #pragma once
 
-#include <chrono>
 #include <string>
+
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -23,7 +24,7 @@ private:
     bool on_terminal_;
     bool shown_ = false;
     double seconds_;
-    std::chrono::steady_clock::time_point start_;
+    Stopwatch watch_;
 };
 
 }  // namespace lobatto

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 #include <map>
 #include <sstream>
@@ -15,6 +14,7 @@
 
 #include "library/errors.hpp"
 #include "runtime/error.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -146,7 +146,7 @@ StudyTimes CrewLeader::compute(std::int64_t first, std::int64_t last,
                                const std::function<void(const SweepBlock&)>& take,
                                const std::function<void()>& meanwhile, const volatile int* interrupted,
                                double cells_each) {
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     const int workers = ranks_.count() - 1;
     const auto fitting =
         std::max<std::int64_t>(1, static_cast<std::int64_t>(static_cast<double>(most_cells) / cells_each));
@@ -206,7 +206,7 @@ StudyTimes CrewLeader::compute(std::int64_t first, std::int64_t last,
         }
     }
     all.threads *= workers;
-    all.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    all.seconds = watch.seconds();
     return all;
 }
 

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cstring>
 #include <filesystem>
 
@@ -13,6 +12,7 @@
 #include "runtime/build/recipe.hpp"
 #include "runtime/error.hpp"
 #include "runtime/kernel/abi.h"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 namespace {
@@ -73,9 +73,9 @@ Compiled build(const Recipe& recipe, const std::atomic<bool>* abandoned) {
     request.abandoned = abandoned;
     request.environment = {{"TMPDIR", request.folder}};  // what a killed compiler leaves is removed with the folder
     write_file(request.folder + "/" + recipe.source, recipe.text);
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     const ProcessResult result = run_process(request);
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    const double seconds = watch.seconds();
     if (result.abandoned) {
         std::error_code ignored;
         std::filesystem::remove_all(request.folder, ignored);
@@ -99,7 +99,7 @@ Compiled build(const Recipe& recipe, const std::atomic<bool>* abandoned) {
                                        first_lines(result.output), kept));
     }
     entry.publish(recipe.object);
-    return {entry.object_path(), command, false, elapsed.count(), was_altered};
+    return {entry.object_path(), command, false, seconds, was_altered};
 }
 
 Compiled compile(const Translation& translation, const std::atomic<bool>* abandoned) {

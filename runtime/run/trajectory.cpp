@@ -3,11 +3,11 @@
 #include "runtime/run/trajectory.hpp"
 #include "runtime/run/parts.hpp"
 #include "runtime/run/timing.hpp"
+#include "runtime/stopwatch.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <ctime>
 #include <utility>
@@ -15,12 +15,6 @@
 namespace lobatto {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 constexpr std::int64_t rows_at_once = 4096;   // the records in memory, however long the run
 constexpr double block_seconds = 0.02;        // of a block of steps: an interruption is noticed within about twice this
@@ -127,11 +121,11 @@ public:
     explicit Checkpoints(const TrajectoryRequest& request) : request_(request) {}
 
     void look(const NumberStepper& stepper, const TrajectoryResult& result) {
-        if (!request_.checkpoint || seconds_since(last_) < pause_) return;
-        const Clock::time_point start = Clock::now();
+        if (!request_.checkpoint || last_.seconds() < pause_) return;
+        const Stopwatch watch;
         request_.checkpoint({result, stepper.memory()});
-        last_ = Clock::now();
-        pause_ = std::max(checkpoint_seconds, seconds_since(start) / checkpoint_part);
+        last_ = Stopwatch();
+        pause_ = std::max(checkpoint_seconds, watch.seconds() / checkpoint_part);
     }
     void at_once(const NumberStepper& stepper, const TrajectoryResult& result) {
         pause_ = 0;
@@ -140,7 +134,7 @@ public:
 
 private:
     const TrajectoryRequest& request_;
-    Clock::time_point last_ = Clock::now();
+    Stopwatch last_;
     double pause_ = checkpoint_seconds;
 };
 
@@ -318,7 +312,7 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         request.events && kernel->events > 0 ? std::max<std::int64_t>(rows_at_once, kernel->events_of_step) : 0;
     LastOfChain last_of_chain(kernel, request);
     Pace pace;
-    Clock::time_point last_progress = Clock::now();
+    Stopwatch since_progress;
     while (result.steps_done < request.steps && result.status == LOBATTO_OK) {
         result.interrupted = request.interrupted != nullptr && *request.interrupted != 0;
         if (result.interrupted) {
@@ -328,11 +322,11 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
         lobatto_advance call = call_for(request, rows, event_rows);
         last_of_chain.ask(call);
         call.steps = std::min(pace.block(), request.steps - result.steps_done);
-        const Clock::time_point start = Clock::now();
+        const Stopwatch watch;
         const double processor_start = processor_seconds();
         result.status = stepper.advance(call, records, events);
         result.seconds += processor_seconds() - processor_start;
-        const double seconds = seconds_since(start);
+        const double seconds = watch.seconds();
         add(result, call);
         stepper.state(time, q, p);
         result.time = time[0];
@@ -351,8 +345,8 @@ TrajectoryResult integrate(const Kernel& kernel, const TrajectoryRequest& reques
             return result;
         }
         pace.took(seconds, call.steps_done);
-        if (request.progress && seconds_since(last_progress) > progress_seconds) {
-            last_progress = Clock::now();
+        if (request.progress && since_progress.seconds() > progress_seconds) {
+            since_progress = Stopwatch();
             request.progress(result.steps_done);
         }
         if (result.status == LOBATTO_OK) checkpoints.look(stepper, result);

@@ -10,6 +10,7 @@
 
 #include "analysis/accuracy/companion/distance.hpp"
 #include "runtime/run/parts.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -26,10 +27,6 @@ constexpr double same_time = 0x1p-48;   // relative: times that differ by no mor
 constexpr double same_as_rounded = 16;  // likewise, roundings of the kernel's numbers
 // Terms that are looked at along steps of the companion, for what is narrow in them; a step counts as some, at least.
 constexpr std::int64_t most_looked = 4000000, looked_a_step = 8;
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 }  // namespace
 
@@ -360,13 +357,13 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
     if (has_end) {
         const bool begins_now = !thread_.joinable() && !finished_;  // there is one processor: it waited until now
         if (begins_now) start();
-        const auto now = std::chrono::steady_clock::now();
+        const Stopwatch watch;
         const double longest = is_finer_ || result.seconds < short_run ? std::numeric_limits<double>::infinity()
                                : begins_now                            ? result.seconds / 2
                                                                        : 0,
                      to_first = 4 * result.seconds;  // where few states are kept
         while (!finished_ && !has_caught_up() &&
-               seconds_since(now) < (has_compared() ? longest : std::fmax(longest, to_first)))
+               watch.seconds() < (has_compared() ? longest : std::fmax(longest, to_first)))
             std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
     cancelled_ = true;

@@ -2,7 +2,6 @@
 #include "analysis/accuracy/companion/ensemble_companion.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -13,6 +12,7 @@
 #include "analysis/accuracy/companion/errors_of_steps.hpp"
 #include "runtime/build/number_stepper.hpp"
 #include "runtime/run/parts.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -71,14 +71,13 @@ void EnsembleCompanion::compute(std::int64_t first) {
                               : seconds_of_one_ == 0 ? group
                                                      : std::llround(seconds_at_once / seconds_of_one_),
                        count = std::min(std::max(std::min(room, fast), group), request_.first + request_.count - first);
-    const auto begun = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     first_ = first;
     known_.assign(static_cast<std::size_t>(count), {});
     const std::int64_t whole = request_.steps / every * every;
     take(0, whole, every);
     if (whole < request_.steps) take(whole, request_.steps - whole, request_.steps - whole);
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begun;
-    seconds_of_one_ = std::fmax(took.count(), 1e-9) / static_cast<double>(count);
+    seconds_of_one_ = std::fmax(watch.seconds(), 1e-9) / static_cast<double>(count);
 }
 
 void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_t every) {

@@ -23,6 +23,7 @@
 #include "runtime/run/other_velocity.hpp"
 #include "runtime/run/parts.hpp"
 #include "runtime/run/timing.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -384,7 +385,7 @@ double memory_of(const Kernel& kernel, const EnsembleRequest& request) {
 }
 
 EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     EnsembleResult result;
     const Plan plan(kernel, request);
     result.lanes = request.device ? static_cast<int>(plan.group_size) : std::max(kernel->lanes, 1);
@@ -446,7 +447,7 @@ EnsembleResult integrate(const Kernel& kernel, const EnsembleRequest& request) {
         result.interrupted = result.trajectories < std::min((number + 1) * plan.group_size, request.count);
         meanwhile();
     }
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    result.seconds = watch.seconds();
     return result;
 }
 
