@@ -7,7 +7,6 @@
 
 #include "generator/emit/function_text.hpp"
 #include "generator/emit/support.hpp"
-#include "generator/graph/notation.hpp"
 #include "generator/mechanics/derivation.hpp"
 #include "generator/programs/identifier.hpp"
 
@@ -34,10 +33,10 @@ std::string preamble(const Derivation& d, const KernelSource& source) {
         "docs/derivation.md.\n//\n";
     text += wrapped("// Lagrangian   L = " + comment_safe(d.scene.lagrangian_text), "//                  ");
     if (d.scene.clock)
-        text += wrapped(
-            "// Clock        dt = g dtau, g = " +
-                (d.scene.clock->is_automatic ? canonical_text(d.scene.clock->rate) : comment_safe(d.scene.clock->text)),
-            "//                  ");
+        text += wrapped("// Clock        dt = g dtau, g = " + (d.scene.clock->is_automatic
+                                                                   ? "auto (D65), 1 at the start of the scene"
+                                                                   : comment_safe(d.scene.clock->text)),
+                        "//                  ");
     text +=
         fmt::format("// Method       {}: order {}, {}\n", d.quadrature.method.name(), d.quadrature.order(),
                     d.system.has_forces() ? "variational, with forces (Lagrange-d'Alembert)" : "symplectic, symmetric");
