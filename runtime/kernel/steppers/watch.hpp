@@ -39,7 +39,7 @@ public:
         events.keep(stepper);
         if constexpr (goes_back) {
             time = stepper.time();
-            parameters = stepper.parameters;
+            if constexpr (walls > 0) parameters = stepper.parameters;
             for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
             stepper.momentum(p);
         }
@@ -86,7 +86,7 @@ private:
     }
 
     void go_back(S& stepper) {
-        stepper.parameters = parameters;
+        if constexpr (walls > 0) stepper.parameters = parameters;
         put(stepper, q, p, stepper.steps - 1);
     }
     // A state at one of the stepper's own times, with its parameters.
