@@ -364,7 +364,7 @@ void run(const RunOptions& options) {
         if (verdict.error)
             print_row("measured error", text_of(*verdict.error, scene));
         else if (!options.unmeasured && result.stop >= 0)
-            print_row("measured error", "none: it stopped before the first comparison; give an earlier end (--until)");
+            print_row("measured error", "none: the companion did not come to the stop");
         print_events(scene, result, observers.counts, files.events_path());
         const double states = observers.counts[0];
         print_row("trajectory", fmt::format("{}, {} {}", path, states, states == 1 ? "state" : "states"));

@@ -126,7 +126,7 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
     if (study.measures() && all.unmeasured > 0 && !scene.run.stops.empty())
         print_row(
             all.error.index >= 0 ? "  not of" : "measured error",
-            fmt::format("{}{} stopped before the first comparison; keep states on the way (--every)",
+            fmt::format("{}{} could not be followed to the stop in other steps",
                         all.error.index >= 0 ? "" : "none: ", counted(all.unmeasured, "trajectory", "trajectories")));
     print_state(scene, tally);
 }

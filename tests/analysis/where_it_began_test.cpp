@@ -42,3 +42,39 @@ TEST_CASE("iterations that go beyond the speed of light come back") {
     for (const auto& row : test::read_trajectory(folder / "run.csv").rows)
         CHECK(std::hypot(row[1] - centre, row[2]) == doctest::Approx(radius).epsilon(1e-12));
 }
+
+TEST_CASE("the error of an escape is measured at its stop, whatever end was asked for" * doctest::test_suite("slow")) {
+    // Henon and Heiles' potential above its saddles; the time of the stop by a Taylor series in 40 digits.
+    constexpr double stop = 42.107854171345, speed = 5.2;
+    const test::TemporaryFolder folder;
+    for (const char* until : {"60", "600", "6000"}) {
+        INFO(until);
+        test::write_text(
+            folder / "scene.toml",
+            fmt::format(
+                "lagrangian = \"(x'^2 + y'^2)/2 - (x^2 + y^2)/2 - x^2*y + y^3/3\"\n[coordinates]\n"
+                "x = {{ position = 0, velocity = \"v*cos(phi)\" }}\ny = {{ position = 0, velocity = \"v*sin(phi)\" }}\n"
+                "[parameters]\nv = 0.62\nphi = \"42*2*pi/399\"\n[method]\npoints = 5\n[run]\nstep = 0.1\n"
+                "until = {}\nstop = [\"x^2 + y^2 = 16 rising\"]\n",
+                until));
+        const test::Finished ran =
+            test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--json"});
+        INFO(ran.err);
+        REQUIRE(ran.exit_code == 0);
+        const auto end = test::read_trajectory(folder / "run.csv").rows.back();
+        const double largest = std::fmax(std::fabs(end[1]), std::fabs(end[2])),
+                     error = std::fabs(end[0] - stop) * speed;
+        const std::size_t at = ran.out.find("\"at_end\"");
+        REQUIRE(at != std::string::npos);
+        const double printed = std::stod(ran.out.substr(ran.out.find(':', at) + 1)) * largest;
+        CHECK(printed > error / 5);
+        CHECK(printed < error * 5);
+        const test::Finished swept = test::run(
+            {LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "v=0.62", "-o", folder / "sweep.csv"});
+        INFO(swept.err);
+        CHECK(swept.exit_code == 0);
+        const double in_table = test::read_trajectory(folder / "sweep.csv").rows.back().back() * largest;
+        CHECK(in_table > error / 5);
+        CHECK(in_table < error * 5);
+    }
+}

@@ -90,7 +90,13 @@ void Companion::observe(const Records& records) {
     for (std::int64_t i = 0; i < records.count; ++i) {
         const double* const row = records.rows + i * records.columns + 1;
         widen_to(range_.least, range_.most, row, count);
-        if (records.is_stop) continue;
+        if (records.is_stop) {
+            const auto parts = static_cast<std::size_t>(records.whole != nullptr ? records.parts : 1);
+            stop_time_ = as_parts({row[-1]}, parts_);
+            if (parts > 1) std::copy_n(records.whole + i * records.columns * records.parts, parts, stop_time_.data());
+            stop_ = point_of(records, i, at_stop);
+            continue;
+        }
         // With a clock the states at its steps stand between the arrivals, which are told by their times.
         const bool is_arrival = request_.arrivals.interval == 0 || row[-1] == time_after(request_, seen_);
         if (!is_arrival) continue;
@@ -98,13 +104,23 @@ void Companion::observe(const Records& records) {
         if (number % rows_a_step_ != 0) continue;
         const std::int64_t steps = std::min(number / rows_a_step_ * request_.every, request_.steps);
         if (steps == 0 || (steps % stride_ != 0 && steps != request_.steps)) continue;
-        const auto parts = static_cast<std::size_t>(records.whole != nullptr ? records.parts : 1);
-        const double* const whole = parts > 1 ? records.whole + (i * records.columns + 1) * records.parts : row;
-        Point point{steps, std::vector<double>(count * parts_, 0.0)};
-        for (std::size_t k = 0; k < count; ++k)
-            std::copy_n(whole + k * parts, parts, point.row.data() + k * parts_);  // finer numbers end with zeros
-        run_.push_back(std::move(point));
+        run_.push_back(point_of(records, i, steps));
     }
+}
+
+Companion::Point Companion::point_of(const Records& records, std::int64_t row, std::int64_t steps) const {
+    const std::size_t count = 2 * groups_.size();
+    const auto parts = static_cast<std::size_t>(records.whole != nullptr ? records.parts : 1);
+    const double* const whole = parts > 1 ? records.whole + (row * records.columns + 1) * records.parts
+                                          : records.rows + row * records.columns + 1;
+    Point point{steps, std::vector<double>(count * parts_, 0.0)};
+    for (std::size_t k = 0; k < count; ++k)
+        std::copy_n(whole + k * parts, parts, point.row.data() + k * parts_);  // finer numbers end with zeros
+    return point;
+}
+
+double Companion::time_of(const Point& point) const {
+    return point.steps == at_stop ? stop_time_.front() : time_after(request_, point.steps);
 }
 
 Companion::Segment Companion::segment(std::size_t number) const {
@@ -234,30 +250,72 @@ void Companion::take(CompanionPlace& place, const Segment& part) {
     }
 }
 
-void Companion::compute() {
+// Where the companion is after so many comparisons; at first, beside the start.
+CompanionPlace Companion::place_after(std::size_t comparisons) {
     CompanionPlace place{NumberStepper(kernel_), as_parts({request_.time}, parts_),
                          as_parts({0}, parts_),  request_.whole_q,
                          request_.whole_p,       request_.arrivals};
-    std::size_t done = 0;
-    {
-        const std::lock_guard lock(mutex_);
-        done = companion_.size();
-        if (done > 0) {
-            const auto middle = companion_.back().row.begin() + std::ssize(place.q);
-            place.q.assign(companion_.back().row.begin(), middle);
-            place.p.assign(middle, companion_.back().row.end());
-            place.time = is_clocked() ? as_parts({time_after(request_, companion_.back().steps)}, parts_)
-                                      : times_fraction(request_.whole_step, companion_.back().steps, 1);
-            if (!is_clocked()) place.time[0] += request_.time;
-        }
+    if (comparisons > 0) {
+        const Point& point = companion_[comparisons - 1];
+        const auto middle = point.row.begin() + std::ssize(place.q);
+        place.q.assign(point.row.begin(), middle);
+        place.p.assign(middle, point.row.end());
+        place.time = is_clocked() ? as_parts({time_after(request_, point.steps)}, parts_)
+                                  : times_fraction(request_.whole_step, point.steps, 1);
+        if (!is_clocked()) place.time[0] += request_.time;
     }
-    if (done == 0 && !is_finer_) {
+    if (comparisons == 0 && !is_finer_) {
         std::vector<double> moved = place.q;
         move_beside(kernel_, moved);
         if (place.stepper.prepare(request_.whole_parameters, request_.whole_step) == LOBATTO_OK &&
             place.stepper.start(place.time, moved, place.p) == LOBATTO_OK)
             place.q = moved;  // else the start is at the edge of where the Lagrangian is real
     }
+    return place;
+}
+
+// From the last comparison before the stop to there, if the companion has come so far.
+void Companion::compare_at_stop() {
+    if (stop_time_.empty() || companion_.size() < run_.size()) return;
+    companion_.resize(run_.size());
+    companion_ranges_.resize(run_.size());
+    const std::int64_t begin = run_.empty() ? 0 : run_.back().steps;
+    const double from = time_after(request_, begin);
+    CompanionPlace place = place_after(run_.size());
+    std::vector<double> way = minus(stop_time_, request_.time);
+    for (const double part : times_fraction(request_.whole_step, begin, 1)) way = minus(way, part);
+    way_ = {};
+    cancelled_ = false;
+    if (is_clocked()) {
+        place.arrivals = {std::numeric_limits<double>::infinity(), stop_time_.front(), false};
+        place.set_step(step_of(segment(0)), request_.whole_parameters);
+        place.advance(1, request_.tolerance);
+    } else if (way.front() * request_.step > 0) {
+        const double wanted = std::ceil(way.front() / request_.step * ratio_of(segment(0)));
+        const std::int64_t steps = std::max<std::int64_t>(1, std::llround(wanted));
+        const std::vector<double> step = times_fraction(way, 1, steps);
+        for (std::int64_t i = 0; i < steps && place.status == LOBATTO_OK; ++i) {
+            take_finely(place, from + static_cast<double>(i) * step.front(), step);
+            if (parts_ == 1) place.time[0] = from + static_cast<double>(i + 1) * step.front();
+        }
+    } else {
+        return;  // the stop is the last comparison
+    }
+    if (place.status != LOBATTO_OK) return;
+    const std::vector<double> row = place.rounded_row();
+    widen_to(way_.least, way_.most, row.data(), row.size());
+    run_.push_back(stop_);
+    companion_.push_back({at_stop, place.row()});
+    companion_ranges_.push_back(std::exchange(way_, {}));
+}
+
+void Companion::compute() {
+    std::size_t done = 0;
+    {
+        const std::lock_guard lock(mutex_);
+        done = companion_.size();
+    }
+    CompanionPlace place = place_after(done);
     // A start is refused at some states on a wall that the motion passes. So where parts of steps fail, the way is
     // taken again in whole ones, from the last place where no new start is needed.
     std::size_t whole_until = 0, safe = done;
@@ -353,7 +411,8 @@ bool Companion::has_compared() const {
 }
 
 std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
-    const bool has_end = result.status == LOBATTO_OK && !result.interrupted && result.steps_done > 0;
+    const bool has_end =
+        result.status == LOBATTO_OK && !result.interrupted && (result.steps_done > 0 || result.stop >= 0);
     if (has_end) {
         const bool begins_now = !thread_.joinable() && !finished_;  // there is one processor: it waited until now
         if (begins_now) start();
@@ -368,6 +427,7 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
     }
     cancelled_ = true;
     if (thread_.joinable()) thread_.join();
+    if (has_end && result.stop >= 0) compare_at_stop();
     if (!has_end || run_.empty() || (companion_.empty() && !stopped_)) return std::nullopt;
     return compare(result);
 }

@@ -70,6 +70,7 @@ public:
     // False: that part had no companion, or one in other numbers.
     bool restore(const std::vector<double>& saved);
 
+    // Where a stop ended the run, the companion is compared there too.
     // Waits for the companion, where it computes in finer numbers or the run took less than a second of processor time,
     // and compares what there is; else that is as much as was computed beside the run. Nothing: the run was stopped, or
     // took no step.
@@ -77,9 +78,10 @@ public:
 
 private:
     struct Point {
-        std::int64_t steps;       // of the run
+        std::int64_t steps;       // of the run; `at_stop`
         std::vector<double> row;  // q, p, as parts
     };
+    static constexpr std::int64_t at_stop = -1;  // between two steps
     struct Range {
         std::vector<double> least, most;  // 2n
     };
@@ -88,6 +90,10 @@ private:
         std::int64_t taken = 0;             // of the companion
     };
 
+    double time_of(const Point& point) const;
+    Point point_of(const Records& records, std::int64_t row, std::int64_t steps) const;
+    CompanionPlace place_after(std::size_t comparisons);
+    void compare_at_stop();
     Segment segment(std::size_t number) const;
     bool is_clocked() const { return request_.arrivals.interval != 0; }
     double ratio_of(const Segment& part) const;
@@ -131,7 +137,9 @@ private:
     Range way_;                  // since the last comparison
     std::int64_t stride_;        // steps of the run between comparisons
     std::int64_t seen_ = 0;
-    std::vector<Point> run_;               // of the run, at comparisons
+    std::vector<Point> run_;         // of the run, at comparisons
+    std::vector<double> stop_time_;  // where a stop ended it, as parts; empty: none did
+    Point stop_{at_stop, {}};
     Range range_;                          // of the run's kept states
     mutable std::mutex mutex_;             // guards what follows
     std::vector<Point> companion_;         // of the companion

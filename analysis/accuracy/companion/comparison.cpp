@@ -72,7 +72,7 @@ std::vector<double> Companion::row_at(std::size_t comparison) const {
         row.insert(row.end(), request_.q.begin(), request_.q.end());
         row.insert(row.end(), request_.p.begin(), request_.p.end());
     } else {
-        row[0] = time_after(request_, run_[comparison - 1].steps);
+        row[0] = time_of(run_[comparison - 1]);
         const std::vector<double> state = rounded(run_[comparison - 1].row, parts_);
         row.insert(row.end(), state.begin(), state.end());
     }
@@ -106,8 +106,7 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     std::vector<double> by_constraints;
     constraints_.widen(by_constraints, request_.time, request_.q.data(), parameters_);
     for (std::size_t j = 0; j < comparisons && !constraints_.empty(); ++j)
-        constraints_.widen(by_constraints, time_after(request_, run_[j].steps), rounded(run_[j].row, parts_).data(),
-                           parameters_);
+        constraints_.widen(by_constraints, time_of(run_[j]), rounded(run_[j].row, parts_).data(), parameters_);
     const std::vector<double> places = places_of(all.least, all.most, by_constraints);
     std::vector<double> shared = amplitudes_of(all.least, all.most, places, groups_, run_epsilon_);
     // What forces that cancel leave of one another moves a coordinate too, and tells nothing.
@@ -143,7 +142,7 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
 void Companion::lose_where_it_began(MeasuredError& error, const std::vector<double>& amplitude, double of_run) const {
     constexpr double least = 1e-3;  // of the amplitude: what is less may be rounding
     Range range;
-    for (std::size_t j = 0; time_after(request_, run_[j].steps) != *error.lost_after; ++j) {
+    for (std::size_t j = 0; time_of(run_[j]) != *error.lost_after; ++j) {
         const std::vector<double> here = row_at(j + 1);
         for (const std::vector<double>& row :
              {std::vector<double>(here.begin() + 1, here.end()), companion_ranges_[j].least, companion_ranges_[j].most})
@@ -173,7 +172,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     for (std::size_t j = 0; j < count; ++j) {
         const Distance distance =
             distance_between(run_[j].row.data(), companion_[j].row.data(), parts_, amplitude, of_run);
-        error.until = time_after(request_, run_[j].steps);
+        error.until = time_of(run_[j]);
         if (j == 0 || distance.relative > worst.relative) worst = distance;
         last = distance;
         course.emplace_back(std::fabs(error.until - request_.time), std::fmax(worst.relative, distance.apart));
@@ -193,7 +192,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });
     if (!error.lost_after && error.doubling && large != course.end() && last.relative < worst.relative / 4) {
         const Point& point = run_[static_cast<std::size_t>(large - course.begin())];
-        lose(error, time_after(request_, point.steps), rounded(point.row, parts_));
+        lose(error, time_of(point), rounded(point.row, parts_));
     }
     // Two motions so far apart may be near one another at one time, as pendulums are where they turn: the largest
     // difference is what is known.

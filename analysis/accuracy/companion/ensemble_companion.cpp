@@ -152,7 +152,7 @@ bool EnsembleCompanion::meets_narrow_terms(const EnsembleTrajectory& trajectory,
 }
 
 bool EnsembleCompanion::goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) {
-    if (trajectory.has_near_cuts || meets_narrow_terms(trajectory, start)) return true;
+    if (trajectory.stop >= 0 || trajectory.has_near_cuts || meets_narrow_terms(trajectory, start)) return true;
     const bool is_clocked = request_.arrivals.interval != 0;  // events alone may hold the time then
     if (outline_.system.autonomous || is_clocked) return false;
     return (request_.every < fewest_driven_steps && request_.every > 0) || has_pulses(start);
@@ -179,19 +179,31 @@ EnsembleCompanion::Error EnsembleCompanion::alone(const EnsembleTrajectory& traj
     }
     request.time = request_.time;
     request.step = request_.step;
-    request.steps = request_.steps;
+    const bool is_stopped = trajectory.stop >= 0;
+    request.steps = is_stopped ? std::min(trajectory.steps_done + 1, request_.steps) : request_.steps;
     request.every = request_.every == 0 ? request_.steps : request_.every;
+    request.arrivals = request_.arrivals;
     request.tolerance = request_.tolerance;
     Companion companion(outline_, kernel_, request, kernel_->epsilon);
     Records kept = trajectory.kept;
-    if (trajectory.stop >= 0) --kept.count;  // where it was stopped, between two steps
+    if (is_stopped) --kept.count;
     companion.observe(kept);
-    companion.compute_here();
     TrajectoryResult result;
     result.steps_done = trajectory.steps_done;
     result.time = time_after(request_, trajectory.steps_done);
+    if (is_stopped) {  // in the last row, between two steps
+        Records stop = trajectory.kept;
+        stop.rows += kept.count * stop.columns;
+        if (stop.whole != nullptr) stop.whole += kept.count * stop.columns * stop.parts;
+        stop.count = 1;
+        stop.is_stop = true;
+        companion.observe(stop);
+        result.stop = trajectory.stop;
+        result.time = stop.rows[0];
+    }
+    companion.compute_here();
     const std::optional<MeasuredError> error = companion.finish(result);
-    if (!error && trajectory.stop >= 0) return {unknown, false};  // before anything could be compared
+    if (!error && is_stopped) return {unknown, false};  // the companion cannot go so far
     if (!error || error->companion_stopped) return {unknown, true};
     return {error->end, error->is_lost()};
 }
@@ -250,13 +262,9 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     Known& known = known_[static_cast<std::size_t>(place)];
     const std::size_t n = groups_.size();
     const Records& kept = trajectory.kept;
-    const std::int64_t compared = std::ssize(known.rows) / static_cast<std::int64_t>(2 * n * parts_);
-    const bool is_stopped = trajectory.stop >= 0;
-    // Of a trajectory that was stopped: the start, and where it was stopped, between two steps.
-    const std::int64_t comparisons = is_stopped ? std::max<std::int64_t>(kept.count - 2, 0) : compared,
-                       skipped = is_stopped ? 1 : kept.count - comparisons;
-    if (is_stopped && comparisons == 0) return {unknown, false};
-    if (known.status != LOBATTO_OK && !(is_stopped && comparisons < compared)) return {unknown, true};
+    const std::int64_t comparisons = std::ssize(known.rows) / static_cast<std::int64_t>(2 * n * parts_);
+    const std::int64_t skipped = kept.count - comparisons;
+    if (known.status != LOBATTO_OK) return {unknown, true};
     const auto run_at = [&](std::int64_t j) { return whole_row(kept, skipped + j); };
     const auto companion_at = [&](std::int64_t j) {
         return known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);
