@@ -25,6 +25,11 @@ constexpr double most_every = 9e15;  // the steps that a run can have
                     "'{}' is declared constant in {}, so it is part of the kernel; only run-time parameters can be set",
                     name, scene.path));
     }
+    for (const Coordinate& coordinate : scene.coordinates)
+        if (coordinate.written == name || coordinate.name == name)
+            source.fail({1, 1}, fmt::format("'{0}' is a coordinate, whose start stands in {1}; `lobatto sweep --vary "
+                                            "{0}=0.1` starts elsewhere",
+                                            name, scene.path));
     std::vector<std::string> names;
     for (const Parameter& parameter : scene.parameters)
         if (!parameter.is_side) names.push_back(parameter.written);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "analysis/tradeoff/exploration.hpp"
+#include "analysis/until_stop.hpp"
 #include "generator/mechanics/constraints/impacts.hpp"
 #include "library/whole.hpp"
 #include "runtime/error.hpp"
@@ -64,6 +65,7 @@ ChangedScene measurable(const Scene& scene, const Settings& settings, const std:
     ChangedScene scenes{scene.parts().scene, scene.parts().scene};
     refuse_jumps(scenes.written, command);
     apply(overrides_of(settings), scenes.changed);
+    scenes.changed = ending_at_stop(std::move(scenes.changed));
     return scenes;
 }
 

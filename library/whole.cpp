@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "analysis/kernel/support_text.hpp"
+#include "analysis/until_stop.hpp"
 #include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/constraints/constraints.hpp"
 #include "generator/mechanics/constraints/impacts.hpp"
@@ -54,7 +55,14 @@ StabilityReport stability_of(const Scene& scene, const Settings& settings) {
             "{}: what is exact here is of Lobatto and Gauss; choose one (--points 4), or ask for the limits of the "
             "method alone: lobatto stability --splitting {}",
             changed.path, changed.method.points));
-    return stability_report(changed, overrides_of(settings));
+    Overrides overrides = overrides_of(settings);
+    if (!changed.run.stops.empty()) {
+        lobatto::Scene with_values = changed;
+        apply(overrides, with_values);
+        with_values = ending_at_stop(std::move(with_values));
+        overrides.until = fmt::format("{}", with_values.evaluate(with_values.run.until, "the end time").to_double());
+    }
+    return stability_report(changed, overrides);
 }
 
 lobatto::Scene for_roundoff(const Scene& scene, const Settings& settings) {

@@ -299,7 +299,12 @@ std::string option_hint(const std::string& what, const CLI::App& command) {
     std::vector<std::string> names;
     for (const CLI::Option* option : command.get_options())
         for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-    const std::string hint = suggestion(what.substr(at, what.find_first_of(" =", at) - at), names);
+    const std::string word = what.substr(at, what.find_first_of(" =", at) - at);
+    if (command.get_parent() != nullptr)
+        for (const CLI::App* other : command.get_parent()->get_subcommands([](const CLI::App*) { return true; }))
+            for (const CLI::Option* option : other->get_options())
+                if (option->check_name(word)) return fmt::format(". `lobatto {}` has it", other->get_name());
+    const std::string hint = suggestion(word, names);
     return hint.empty() ? "" : "." + hint;
 }
 

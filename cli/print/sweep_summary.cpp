@@ -22,13 +22,20 @@ std::string spread_text(const Spread& spread) {
 }
 
 // Which parameters that vary decide the step or the end time: those of the scene count, for all trajectories.
-void print_fixed_times(const Scene& scene, const SweepStarts& starts) {
+void warn_of_fixed_times(const Scene& scene, const SweepStarts& starts) {
+    const bool varies_step = starts.varies(VariedName::Role::step, 0);
     for (const SweepStarts::Column& column : starts.columns()) {
         if (column.of.role != VariedName::Role::parameter) continue;
         const Parameter& parameter = scene.parameters[column.of.index];
-        if (scene.run.step.has(parameter.symbol) || scene.run.until.has(parameter.symbol))
-            fmt::print("The step and the end time are those of {} = {:.6g} for all trajectories.\n", parameter.written,
-                       scene.evaluate(parameter.value, parameter.name).to_double());
+        const bool has_step = !varies_step && scene.run.step.has(parameter.symbol),
+                   has_end = scene.run.until.has(parameter.symbol);
+        if (has_step || has_end)
+            tell("lobatto: warning: {} for all trajectories {} of {} = {:.6g}.\n",
+                 has_step && has_end ? "the step and the end time"
+                 : has_step          ? "the step"
+                                     : "the end time",
+                 has_step && has_end ? "are those" : "is that", parameter.written,
+                 scene.evaluate(parameter.value, parameter.name).to_double());
     }
 }
 
@@ -134,7 +141,6 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
 void print_sweep_notes(const SweepStudy& study) {
     if (study.starts().settings() == 1 && !study.first_setting().steps.reaches_end)
         fmt::print("The end time is not a multiple of the step: the runs end at the last multiple before it.\n");
-    print_fixed_times(study.scene(), study.starts());
 }
 
 std::string failures_text(const SweepStudy& study, const SweepTally& tally) {
@@ -155,10 +161,19 @@ std::string failures_text(const SweepStudy& study, const SweepTally& tally) {
                         ? fmt::format(" after t = {:.6g}, the last of its times that it reached", failure.time)
                         : fmt::format(" in step {}, after t = {:.6g}", failure.steps_done + 1, failure.time);
     }
-    return text + "\nTry a smaller --step, or leave these values out.";
+    const auto some = [&](std::initializer_list<int> statuses) {
+        return std::any_of(statuses.begin(), statuses.end(), [&](int status) { return tally.count_of(status) > 0; });
+    };
+    text += "\nTry ";
+    if (some({LOBATTO_NOT_CONVERGED, LOBATTO_NOT_FINITE, LOBATTO_SINGULAR_JACOBIAN, LOBATTO_TIME_STANDS_STILL, departed,
+              unresolved}))
+        text += "a smaller --step, ";
+    if (some({unresolved})) text += "an earlier end, --beyond-horizon for the statistics of chaos, ";
+    return text + "or leave these values out.";
 }
 
 void warn_of_errors(const SweepStudy& study, const SweepTally& tally) {
+    if (study.starts().settings() == 1) warn_of_fixed_times(study.scene(), study.starts());
     const Worst worst = tally.worst_error();
     if (worst.index >= 0 && worst.value > large_error)
         tell(

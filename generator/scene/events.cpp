@@ -225,6 +225,16 @@ std::vector<Text> pieces_of(const Text& text) {
     return pieces;
 }
 
+// Where the bracket at `open` closes; the end of the text where it does not.
+std::size_t closing_of(const std::string& text, std::size_t open) {
+    int depth = 0;
+    for (std::size_t i = open; i < text.size(); ++i) {
+        depth += text[i] == '(' ? 1 : text[i] == ')' ? -1 : 0;
+        if (depth == 0) return i;
+    }
+    return text.size();
+}
+
 const std::vector<std::pair<std::string, Reduction::Of>> reductions = {
     {"first", Reduction::Of::first}, {"count", Reduction::Of::count}, {"max", Reduction::Of::max},
     {"min", Reduction::Of::min},     {"mean", Reduction::Of::mean},   {"last", Reduction::Of::last}};
@@ -262,9 +272,11 @@ void SystemReader::read_kept(const std::vector<std::string>& given) {
         for (const Text& piece : pieces_of(text)) read_kept(source, piece);
     }
     if (entry == nullptr || !given.empty()) return;
+    if (entry->value.kind == Value::Kind::text) return read_kept(source_, entry->value.text);
     if (entry->value.kind != Value::Kind::list)
-        fail(entry->value.at, fmt::format("keep must be a list such as [\"first(x = 0)\", \"max(x)\"], not {}",
-                                          entry->value.kind_name()));
+        fail(entry->value.at,
+             fmt::format("keep must be a text or a list such as [\"first(x = 0)\", \"max(x)\"], not {}",
+                         entry->value.kind_name()));
     for (const Value& item : entry->value.items) {
         if (item.kind != Value::Kind::text)
             fail(item.at, fmt::format("what is kept must be a text such as \"max(x)\", not {}", item.kind_name()));
@@ -278,7 +290,7 @@ void SystemReader::read_kept(const Source& source, const Text& text) {
     const std::string name = text.value.substr(0, open == std::string::npos ? text.value.size() : open);
     const auto found = std::find_if(reductions.begin(), reductions.end(),
                                     [&](const auto& reduction) { return reduction.first == name; });
-    if (found == reductions.end() || open == std::string::npos || !text.value.ends_with(')'))
+    if (found == reductions.end() || open == std::string::npos || closing_of(text.value, open) + 1 != text.value.size())
         source.fail(text.at.front(),
                     "what is kept of a trajectory is first(x = 0) or count(x = 0 rising) of an event, or max(x), "
                     "min(x), mean(x), last(x) of a formula");

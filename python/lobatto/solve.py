@@ -67,7 +67,13 @@ def sweep(scene, starts, *, keep=(), threads=0, measure=True, beyond_horizon=Fal
     values = _lobatto.sweep(scene, columns, kept, threads, measure, beyond_horizon, progress, **settings)
     for warning in values["warnings"]:
         warnings.warn(warning, stacklevel=2)
-    return Sweep(scene, values)
+    result = Sweep(scene, values)
+    if not result.ok.all():
+        reasons = ", ".join(f"{(result.status == one).sum()} {result.statuses[one]}"
+                            for one in numpy.unique(result.status) if one != 0)
+        warnings.warn(f"{(~result.ok).sum()} of {len(result)} trajectories failed: {reasons}; .ok is the mask of the others",
+                      stacklevel=2)
+    return result
 
 
 def tune(scene, error, *, budget=20, progress=None, **settings):

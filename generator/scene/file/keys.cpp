@@ -126,7 +126,7 @@ std::vector<Key> make_keys() {
                  key("tangent", Holds::truth, "Whether the derivative of a step is in the kernel"),
                  whole("dense", 0, 100, "States between two steps, on the polynomial of the step"),
                  key("events", Holds::events, "What is looked for, such as \"x = 0 rising\""),
-                 key("keep", Holds::texts, "What a sweep keeps of each trajectory, such as \"max(x)\"")}),
+                 key("keep", Holds::events, "What a sweep keeps of each trajectory, such as \"max(x)\"")}),
         lines("view", "What moves on the page of `lobatto view`; plot names its curves",
               {key("point", Holds::place, "A dot that moves"), key("line", Holds::places, "A line through places"),
                key("spring", Holds::places, "A spring between two places"),

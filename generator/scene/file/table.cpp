@@ -13,7 +13,15 @@ namespace lobatto {
 
 namespace {
 
-// What people of other programs call a key of [run].
+// The section that has a key; empty: none.
+std::string section_of(const std::string& key) {
+    for (const Key& section : scene_keys())
+        for (const Key& one : section.keys)
+            if (one.name == key) return section.name;
+    return "";
+}
+
+// What people of other programs call a key of [run], and keys that stand in the wrong section.
 std::string advice_for(const std::string& key, const std::vector<std::string>& known, const std::string& table) {
     static const std::map<std::string, std::string> others{
         {"dt", "step"},     {"h", "step"},         {"timestep", "step"}, {"tend", "until"},
@@ -21,6 +29,9 @@ std::string advice_for(const std::string& key, const std::vector<std::string>& k
         {"time", "until"},  {"duration", "until"}, {"t_final", "until"}, {"T", "until"}};
     if (table == "[run]" && (key == "start" || key == "t0" || key == "begin" || key == "t_start"))
         return " A run begins at t = 0: write t + 5 for t in the formulas to begin at 5.";
+    if (table == "[method]" && key == "splitting") return " Write family = \"splitting\" and stages = 11.";
+    if (const std::string section = section_of(key); table.starts_with('[') && !section.empty())
+        return fmt::format(" It belongs into [{}].", section);
     const auto found = others.find(key);
     return table == "[run]" && found != others.end() ? fmt::format(" It is called {}.", found->second)
                                                      : suggestion(key, known);
