@@ -104,8 +104,14 @@ Proof proof_of(const Scene& scene, const Settings& settings, const Heard& say) {
     lobatto::Scene chosen = scene.parts().scene;
     apply(overrides_of(settings), chosen);
     if (!settings.set.empty()) check_values(chosen);
-    return prove(
-        std::move(chosen), method_of(settings), say ? say : [](const std::string&, double) {});
+    const std::string path = chosen.path;
+    try {
+        return prove(
+            std::move(chosen), method_of(settings), say ? say : [](const std::string&, double) {});
+    } catch (const lobatto::ComputationError& failure) {
+        const std::string what = failure.what();
+        throw lobatto::ComputationError(what.starts_with(path) ? what : fmt::format("{}: {}", path, what));
+    }
 }
 
 }  // namespace lobatto::api

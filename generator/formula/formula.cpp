@@ -27,8 +27,8 @@ constexpr std::pair<char, std::string_view> stray_signs[] = {
     {'=', "a formula is one side only"},
     {'.', "two points stand only in a sum, as in sum(i = 1 .. n, formula)"},
     {'\'', "a prime belongs directly after the name of a coordinate"},
-    {'<', "a comparison stands only in if(a < b, c, d)"},
-    {'>', "a comparison stands only in if(a > b, c, d)"}};
+    {'<', "a comparison stands only in if(a < b, c, d); an event is written a = b falling"},
+    {'>', "a comparison stands only in if(a > b, c, d); an event is written a = b rising"}};
 
 constexpr std::string_view form_of_series = "a sum is written sum(i = 1 .. n, formula)";
 

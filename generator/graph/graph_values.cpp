@@ -114,8 +114,13 @@ cln::cl_R value_of(Op op, int exponent, const std::vector<cln::cl_R>& x) {
             return cln::plusp(x[0]) ? 1 : -1;
         case Op::positive_part:
             return cln::minusp(x[0]) ? cln::cl_R(0) : x[0];
-        case Op::table:  // beyond its ends as at them: near a start there may be samples that no motion meets
-            return spline_of(exponent / 4)(exponent % 4, real(x[0]));
+        case Op::table: {  // a little beyond its ends as at them: a start may be there, and samples near it
+            const Spline& spline = spline_of(exponent / 4);
+            const cln::cl_R &begin = spline.x().front(), &end = spline.x().back();
+            const cln::cl_R margin = (end - begin) / 10;
+            if (x[0] < begin - margin || x[0] > end + margin) throw DomainError("a table far beyond its ends");
+            return spline(exponent % 4, real(x[0]));
+        }
         case Op::raise:
             if (cln::abs(x[1]) <= 4096 && cln::round1(x[1]) == x[1])
                 return apply(Op::power, cln::cl_I_to_int(cln::round1(x[1])), {x[0]});  // real for a negative base too

@@ -98,7 +98,10 @@ void SystemReader::read_impact(const Entry& entry) {
                  fmt::format("the wall {} holds a velocity; a wall is where positions are", impact.written));
         if (std::none_of(scene_.coordinates.begin(), scene_.coordinates.end(),
                          [&](const Coordinate& c) { return value.expression.has(c.position); }))
-            fail(when.value.at, fmt::format("the wall {} holds no coordinate", impact.written));
+            fail(when.value.at,
+                 fmt::format("the wall {} holds no coordinate; for an impulse at a time, stop there and start "
+                             "anew from a program (docs/limits.md)",
+                             impact.written));
         if (restitution != nullptr) {
             GiNaC::numeric e = 0;
             impact.restitution = read_formula(*restitution, scope_of("the restitution", false), &e);

@@ -52,8 +52,11 @@ const SystemReader::Group& SystemReader::group_of(const Subject& subject) const 
     if (found == groups_.end()) {
         std::vector<std::string> known;
         for (const Group& group : groups_) known.push_back(group.entry->key);
+        const std::string advice =
+            name.ends_with(".omega") ? " A torque on a body acts on the four numbers of its .q (docs/scene_format.md)."
+                                     : suggestion(name, known);
         fail(subject.name.at, fmt::format("unknown coordinate '{}' in [forces]; coordinates: {}.{}", name.substr(0, 40),
-                                          listing(known), suggestion(name, known)));
+                                          listing(known), advice));
     }
     if (found->array && !subject.subscripted)
         fail(subject.name.at,

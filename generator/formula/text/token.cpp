@@ -83,6 +83,10 @@ private:
         if (c == '*' && at(1) == '*') fail(next_, "'**' is not an operator: write ^ for powers");
         const bool range = c == '.' && at(1) == '.';
         const bool prime = c == '\'' && next_ > 0 && value_[next_ - 1] == ']';
+        if (c == '\'' && !prime && value_.substr(0, next_).ends_with("table("))
+            fail(next_,
+                 "the name of a file stands in double quotes, and the formula around it in three single ones: "
+                 "'''table(\"data.csv\", t)'''");
         if (c == '\'' && !prime) fail(next_, "a prime ' belongs directly after the name of a coordinate");
         if (std::string_view("+-*/^()[],=<>").find(c) == std::string_view::npos && !range && !prime) refuse_character();
         next_ += range ? 2 : 1;

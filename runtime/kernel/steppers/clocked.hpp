@@ -149,9 +149,12 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         return before.time + theta * step_size * passed;
     }
 
-    static constexpr int basis = 0;  // the rate of the clock goes with theta too
     void polynomial(real theta, real* position, real* velocity) const {
         Chain::polynomial(theta, position, velocity);
+        slow_down(position, velocity);
+    }
+    void polynomial(const real* value, const real* slope, real* position, real* velocity) const {  // as Chain's
+        Chain::polynomial(value, slope, position, velocity);
         slow_down(position, velocity);
     }
     void momentum(real* momentum) const { Chain::momentum(momentum); }

@@ -105,12 +105,19 @@ private:
     Sample samples[room]{};
     int sample_count{};
 
+    // For formulas; with a clock a sum over nodes.
+    real time_at(real theta) const {
+        if constexpr (K::autonomous)
+            return real(0);
+        else
+            return Between<K>::time(*step, theta);
+    }
+
     void on_grid(int i) {
         if constexpr (S::basis > 0) {
             real position[n], velocity[n];
             step->polynomial(basis_value[i], basis_slope[i], position, velocity);
-            Formulas<K>::event(step->coefficients, Between<K>::time(*step, grid[i]), position, velocity,
-                               +grid_values[i]);
+            Formulas<K>::event(step->coefficients, time_at(grid[i]), position, velocity, +grid_values[i]);
         } else {
             on_polynomial(grid[i], grid_values[i]);
         }
@@ -118,7 +125,7 @@ private:
     void on_polynomial(real theta, real* values) const {
         real position[n], velocity[n];
         step->polynomial(theta, position, velocity);
-        Formulas<K>::event(step->coefficients, Between<K>::time(*step, theta), position, velocity, values);
+        Formulas<K>::event(step->coefficients, time_at(theta), position, velocity, values);
     }
     LOBATTO_APART real on_polynomial(real theta, int e) const {
         real values[K::events];

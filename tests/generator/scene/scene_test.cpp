@@ -641,7 +641,9 @@ TEST_CASE("events have two sides and may have a direction") {
     check("[\"q\"]", 13, "an event is written x = 0, x = 0 rising or x = y falling");
     check("[\"q = 0 risng\"]", 18, "'risng' is no direction: write rising or falling");
     check("[\"q = 0 fast\"]", 18, "'fast' is no direction: after an event write rising or falling, or nothing");
-    check("[\"q < 0\"]", 14, "unexpected character '<' in the event: a comparison stands only in if(a < b, c, d)");
+    check("[\"q < 0\"]", 14,
+          "unexpected character '<' in the event: a comparison stands only in if(a < b, c, d); an event is "
+          "written a = b falling");
     check("[\"q = 0 = m\"]", 18, "an event has one =");
     check("[\"q = 0 rising falling\"]", 25, "missing operator: write rising*falling");
     check("[\"m = 1\"]", 11, "this event never happens: it holds neither a coordinate nor the time");
