@@ -2,8 +2,8 @@
 // What accuracy costs, the cheapest method and step that keep a promise, and what is proved of a scene.
 #include <fmt/format.h>
 
+#include "analysis/accuracy/until_stop.hpp"
 #include "analysis/tradeoff/exploration.hpp"
-#include "analysis/until_stop.hpp"
 #include "generator/mechanics/constraints/impacts.hpp"
 #include "library/whole.hpp"
 #include "runtime/error.hpp"

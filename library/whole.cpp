@@ -5,8 +5,8 @@
 
 #include <utility>
 
+#include "analysis/accuracy/until_stop.hpp"
 #include "analysis/kernel/support_text.hpp"
-#include "analysis/until_stop.hpp"
 #include "generator/mechanics/clock/clock.hpp"
 #include "generator/mechanics/constraints/constraints.hpp"
 #include "generator/mechanics/constraints/impacts.hpp"

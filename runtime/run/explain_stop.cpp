@@ -103,8 +103,8 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
             if (request.arrivals.interval != 0) {
                 why =
                     "the clock comes to 0 along the step, or so near to it that time stands still or the energy is "
-                    "lost, as where a motion falls into a singularity";
-                advice = "a clock that is positive wherever the motion goes, or " + smaller;
+                    "lost, as where a motion falls into a singularity; or the step leads far away";
+                advice = "a clock that is positive wherever the motion goes, equal steps (--clock none), or " + smaller;
                 break;
             }
             why = fmt::format("t + h equals t in the numbers of the run: h = {:.6g} is below the rounding of t",

@@ -260,6 +260,23 @@ TEST_CASE("the clock auto knows the frequencies that are the same everywhere (D6
     }
 }
 
+TEST_CASE("a solution of a step that lies far away is not taken") {
+    // A comet without mass beside a planet: the first step has a solution at t = 4e54.
+    const test::TemporaryFolder folder;
+    test::write_text(
+        folder / "scene.toml",
+        "lagrangian = \"sum(i = 1 .. 3, m[i]*(x[i]'^2 + y[i]'^2 + z[i]'^2)/2) + G*sum(i = 2 .. 3, sum(j = 1 .. "
+        "i - 1, m[i]*m[j]/sqrt((x[i] - x[j])^2 + (y[i] - y[j])^2 + (z[i] - z[j])^2)))\"\n[coordinates]\n"
+        "x = { position = [0, 5.2, 1], velocity = [0, 0, 0] }\n"
+        "y = { position = [0, 0, 0], velocity = [0, 2.755, 8.28] }\n"
+        "z = { position = [0, 0, 0.05], velocity = [0, 0, 0.1] }\n[parameters]\nG = 39.47841760435743\n"
+        "m = [1, 9.54e-4, 1e-15]\n[method]\npoints = 9\nclock = \"auto\"\n[run]\nstep = 0.05\nuntil = 60\n");
+    const test::Finished ended = test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv"});
+    CHECK(ended.exit_code == 3);
+    CHECK(test::contains(ended.err, "equal steps (--clock none)"));
+    for (const auto& row : test::read_trajectory(folder / "run.csv").rows) CHECK(row[0] <= 60);
+}
+
 TEST_CASE("the clock auto follows escapes in a turning frame") {
     // Hill's problem, away from the planet: with steps that grow like r^(3/2) the run stopped at t = 1.55.
     const Scene scene = scene_of(

@@ -52,6 +52,21 @@ TEST_CASE("what stands in the wrong place is told where it belongs") {
                          "it is linear in the velocities, as phase-space and guiding-centre Lagrangians are"));
 }
 
+TEST_CASE("keys, options and quotes in the wrong place are told the right one") {
+    const std::string good = "x'^2/2 - x^2/2";
+    CHECK(test::contains(told(oscillator(good, "step = 0.1\nevents = [\"x = 0\"]")), "It belongs into [output]."));
+    CHECK(test::contains(told(oscillator(good, "step = 0.1", "[method]\nsplitting = 11\n")),
+                         "Write family = \"splitting\" and stages = 11."));
+    CHECK(test::contains(told(oscillator(good, "step = 0.1\nstop = \"x < 0\"")), "an event is written a = b falling"));
+    CHECK(test::contains(told(oscillator(good, "step = 0.1"), 2, {"--set", "x=2"}),
+                         "'x' is a coordinate, whose start stands in"));
+    CHECK(test::contains(told(oscillator(good, "step = 0.1"), 2, {"--vary", "x=2"}), "`lobatto sweep` has it"));
+    CHECK(test::contains(told(oscillator(good, "step = 0.1", "[output]\nkeep = \"max(x) - min(x)\"\n")),
+                         "what is kept of a trajectory is first(x = 0) or count(x = 0 rising) of an event"));
+    CHECK(test::contains(told(oscillator(good + " + x*table('a.csv', x)", "step = 0.1")),
+                         "'''table(\"data.csv\", t)'''"));
+}
+
 TEST_CASE("blanks beside the equals sign of --set do no harm; a missing folder is told at once") {
     const std::string scene = oscillator("x'^2/2 - k*x^2/2", "step = 0.1", "[parameters]\nk = 1\n");
     CHECK(told(scene, 0, {"--set", "k = 2"}).empty());
@@ -95,6 +110,26 @@ TEST_CASE("a pulse on a chain may have tails below the range of numbers, and mom
     CHECK(numbers[5] == doctest::Approx(64 * 65 / 2).epsilon(1e-13));
     CHECK(numbers[6] == doctest::Approx(64 * 65 / 2).epsilon(1e-13));
     CHECK(numbers[7] == numbers[8]);
+}
+
+TEST_CASE("verify looks at a table where it has values, and judges no energy of an escape in a turning frame" *
+          doctest::test_suite("slow")) {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "rho.csv",
+                     "100, 6.2\n150, 0.73\n200, -1.35\n300, -3.95\n400, -5.86\n500, -7.5\n700, -10.2\n1000, -12.5\n");
+    test::write_text(
+        folder / "decay.toml",
+        "lagrangian = \"x'^2/2 + 398600/x\"\n[coordinates]\nx = { position = 6700, velocity = 1 }\n[forces]\n"
+        "x = '''-1e-6*exp(table(\"rho.csv\", x - 6378))*x' '''\n[run]\nstep = 1\nuntil = 20\n");
+    test::write_text(folder / "escape.toml",
+                     "lagrangian = \"((x' - y)^2 + (y' + x)^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
+                     "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }\n[method]\npoints = 9\n"
+                     "clock = \"auto\"\n[run]\nstep = 0.1\nuntil = 40\n");
+    for (const char* scene : {"decay.toml", "escape.toml"}) {
+        const test::Finished proof = test::run({LOBATTO_PROGRAM, "verify", folder / scene});
+        INFO(scene << proof.out << proof.err);
+        CHECK(proof.exit_code == 0);
+    }
 }
 
 TEST_CASE("verify proves a scene with other values") {

@@ -245,7 +245,8 @@ TEST_CASE("inputs stand where formulas of the motion are, and errors say where n
           "inputs.toml:3:19: the input u cannot occur in the initial position of q: write it with numbers and "
           "parameters");
     CHECK(with("step = 0.05", "step = \"v/10\"") ==
-          "inputs.toml:7:9: unknown name 'v' in the step: only numbers, pi and functions of them may stand here");
+          "inputs.toml:7:9: unknown name 'v' in the step: only numbers, pi and functions of them may stand here; "
+          "formulas of other names stand under [definitions]");
     CHECK(with("u*q", "u'*q") == "inputs.toml:1:32: u is an input and has no velocity; only coordinates have one");
     CHECK(with("+ u*q", "") == "inputs.toml:5:1: input u occurs in no formula; use it or remove it");
     CHECK(with("u = 0.5", "u = { value = 0.5, constant = true }").starts_with("inputs.toml:5:20: unknown key"));

@@ -10,6 +10,7 @@
 #include "analysis/accuracy/companion/companion.hpp"
 #include "analysis/accuracy/companion/distance.hpp"
 #include "analysis/accuracy/companion/errors_of_steps.hpp"
+#include "analysis/accuracy/companion/place.hpp"
 #include "runtime/build/number_stepper.hpp"
 #include "runtime/run/parts.hpp"
 #include "runtime/stopwatch.hpp"
@@ -152,7 +153,7 @@ bool EnsembleCompanion::meets_narrow_terms(const EnsembleTrajectory& trajectory,
 }
 
 bool EnsembleCompanion::goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) {
-    if (trajectory.stop >= 0 || trajectory.has_near_cuts || meets_narrow_terms(trajectory, start)) return true;
+    if (trajectory.has_near_cuts || meets_narrow_terms(trajectory, start)) return true;
     const bool is_clocked = request_.arrivals.interval != 0;  // events alone may hold the time then
     if (outline_.system.autonomous || is_clocked) return false;
     return (request_.every < fewest_driven_steps && request_.every > 0) || has_pulses(start);
@@ -248,6 +249,48 @@ std::vector<double> EnsembleCompanion::amplitudes(
     return amplitude;
 }
 
+// From the last comparison before a stop to there, in place of what a companion knows beyond. Kept states: the start,
+// those of comparisons, and where it was stopped. False: it does not come there.
+bool EnsembleCompanion::go_to_stop(Known& known, const Records& kept, const EnsembleStart& start) const {
+    const std::size_t n = groups_.size(), one = 2 * n * parts_;
+    const auto before = static_cast<std::size_t>(std::max<std::int64_t>(kept.count - 2, 0));
+    if (known.rows.size() < before * one) return false;
+    known.rows.resize(before * one);
+    known.ranges.resize(before * 4 * n);
+    const bool is_clocked = request_.arrivals.interval != 0;
+    const auto steps = static_cast<std::int64_t>(before) * every();
+    const std::vector<double> stop(kept.rows + (kept.count - 1) * kept.columns, kept.rows + kept.count * kept.columns);
+    CompanionPlace place{NumberStepper(kernel_), {}, {}, {}, {}, {}};
+    if (before > 0) {
+        const auto last = known.rows.end() - static_cast<std::ptrdiff_t>(one),
+                   middle = last + static_cast<std::ptrdiff_t>(one / 2);
+        place.q.assign(last, middle);
+        place.p.assign(middle, known.rows.end());
+    } else {
+        place.q = parts_ == 1 ? start.q : start.whole_q;
+        place.p.assign(whole_row(kept, 0) + one / 2, whole_row(kept, 0) + one);
+        move_beside(kernel_, place.q);
+    }
+    const double from = time_after(request_, steps), way = stop[0] - from;
+    place.time = as_parts({from}, parts_);
+    const std::vector<double>& parameters = parts_ == 1 ? start.parameters : start.whole_parameters;
+    if (is_clocked) {
+        place.arrivals = {std::numeric_limits<double>::infinity(), stop[0], false};
+        place.set_step({request_.step / clocked_ratio}, parameters);
+        place.advance(1, request_.tolerance * finer_iteration);
+    } else if (way * request_.step > 0) {
+        const double ratio = static_cast<double>(steps_taken(every())) / static_cast<double>(every());
+        const std::int64_t taken = std::max<std::int64_t>(1, std::llround(std::ceil(way / request_.step * ratio)));
+        place.set_step(times_fraction(as_parts({way}, parts_), 1, taken), parameters);
+        place.advance(taken, request_.tolerance * finer_iteration);
+    }
+    if (place.status != LOBATTO_OK) return false;
+    const std::vector<double> row = place.row(), plain = place.rounded_row();
+    known.rows.insert(known.rows.end(), row.begin(), row.end());
+    for (int range = 0; range < 2; ++range) known.ranges.insert(known.ranges.end(), plain.begin(), plain.end());
+    return true;
+}
+
 EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& trajectory) {
     if (request_.steps == 0) return {0, false};
     EnsembleStart start;
@@ -262,9 +305,10 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     Known& known = known_[static_cast<std::size_t>(place)];
     const std::size_t n = groups_.size();
     const Records& kept = trajectory.kept;
+    const bool is_stopped = trajectory.stop >= 0;
+    if (is_stopped ? !go_to_stop(known, kept, start) : known.status != LOBATTO_OK) return {unknown, true};
     const std::int64_t comparisons = std::ssize(known.rows) / static_cast<std::int64_t>(2 * n * parts_);
     const std::int64_t skipped = kept.count - comparisons;
-    if (known.status != LOBATTO_OK) return {unknown, true};
     const auto run_at = [&](std::int64_t j) { return whole_row(kept, skipped + j); };
     const auto companion_at = [&](std::int64_t j) {
         return known.rows.data() + j * static_cast<std::int64_t>(2 * n * parts_);

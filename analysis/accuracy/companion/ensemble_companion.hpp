@@ -44,6 +44,7 @@ private:
     bool goes_alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start);
     bool meets_narrow_terms(const EnsembleTrajectory& trajectory, const EnsembleStart& start);
     bool has_pulses(const EnsembleStart& start);
+    bool go_to_stop(Known& known, const Records& kept, const EnsembleStart& start) const;
     Error alone(const EnsembleTrajectory& trajectory, const EnsembleStart& start) const;
     // As Companion::amplitudes. `pair(j, i)`: number i at comparison j, of the trajectory and of its companion.
     std::vector<double> amplitudes(const Records& kept, const Known& known, const std::vector<double>& parameters,

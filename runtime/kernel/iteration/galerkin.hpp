@@ -25,6 +25,10 @@
 #include "node_mass.hpp"
 #include "time_coordinate.hpp"
 
+#ifdef __clang__  // which warns of loops that are too large to unroll, in mechanisms
+#pragma clang diagnostic ignored "-Wpass-failed"
+#endif
+
 namespace lobatto {
 
 template <class K, class T>

@@ -21,23 +21,31 @@ namespace lobatto {
 // The motion in tau comes near a place where the clock is 0, but not beyond it. Errors of its energy grow there like
 // one over the clock, and may throw it back. So where the clock has become small, the energy is looked at: it may be
 // off by a part of the larger of p.v here and where the clock became small. (At walls p.v vanishes, at poles it grows.)
+// The equations of a step may have a second solution, far away, where the clock is fast: so it is looked at, too, where
+// the clock is much faster than a step ago. No motion makes it faster by a million.
 template <class real>
-struct SmallClock {
+struct WatchedClock {
     real energy_of_start{};  // 0 where the time is a coordinate
-    real largest{};          // rate of the clock until now, of a step
+    real last{};             // rate of the clock, of the step before
+    real largest{};          // until now
     real moving{};           // p.v where it became small; 0: it is not
+    bool has_leapt{};
 
-    // After a step of this rate.
-    bool is_small(real rate) {
+    // After a step of this rate: whether the energy is to be looked at.
+    bool is_suspect(real rate) {
+        const bool is_fast = rate > real(100) * last;
+        has_leapt = rate > real(1e6) * last;
+        last = rate;
         largest = maximum(largest, rate);
-        const bool small = rate < real(0.01) * largest;
-        if (!small) moving = real(0);
-        return small;
+        const bool is_small = rate < real(0.01) * largest;
+        if (!is_small) moving = real(0);
+        return is_small || is_fast;
     }
     // After a step to (q, p), where it is.
     template <class Stepper>
     bool keeps_energy(const Stepper& stepper, const real* q, const real* p) {
         real energy, v[Stepper::n], product = real(0);
+        if (has_leapt) return false;
         if (stepper.energy(real(0), q, p, &energy) != Status::ok) return false;
         if constexpr (Stepper::has_time_coordinate) energy += p[Stepper::n - 1];
         if (stepper.velocity(real(0), q, p, v) != Status::ok) return false;
@@ -62,7 +70,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
     real origin{};                                        // the time at the start
     std::int64_t arrivals{};                              // since the start
     bool is_recorded{};                                   // the state of the chain
-    SmallClock<real> small_clock{};
+    WatchedClock<real> watched_clock{};
 
     Status prepare(const typename K::Parameters& parameters, real h) {
         values = parameters;
@@ -92,7 +100,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         Status status = Chain::prepare(values, step_size);
         if (status == Status::ok) status = Chain::start(real(0), position, momentum);
         now = before = {time, real(0)};
-        small_clock = {has_time_coordinate ? real(0) : of_start};
+        watched_clock = {has_time_coordinate ? real(0) : of_start, clock_at(position)};
         origin = time;
         arrivals = 0;
         is_recorded = true;
@@ -107,7 +115,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
         const Status status = Chain::step();
         if (status != Status::ok) return status;
         if (!is_ahead(elapsed) || now.time + elapsed == now.time ||
-            (small_clock.is_small(elapsed / step_size) && !small_clock.keeps_energy(*this, q, p))) {
+            (watched_clock.is_suspect(elapsed / step_size) && !watched_clock.keeps_energy(*this, q, p))) {
             for (int k = 0; k < n; ++k) {
                 q[k] = q_before[k];
                 p[k] = p_of_start[k];

@@ -31,7 +31,7 @@ struct ClockedEnsemble : Ensemble<K, width> {
     T q_passed[n], p_passed[n];
     T target;  // the time of the next arrival
     real origin[width]{}, tolerance{}, interval{}, end{};
-    SmallClock<real> small_clock[width];
+    WatchedClock<real> watched_clock[width];
     std::int64_t arrived[width]{}, recorded[width]{};  // arrivals since the start; the last of them that has a row
     ShortenedStep<K, T, true> shortened;
     bool is_filled{};
@@ -147,7 +147,7 @@ private:
         }
         for (int i = 0; i < K::nodes; ++i) set_lane(motion.fixed_point.rates[i], lane, real(1));
         origin[lane] = time;
-        small_clock[lane] = single.small_clock;
+        watched_clock[lane] = single.watched_clock;
         arrived[lane] = recorded[lane] = 0;
     }
 
@@ -171,8 +171,8 @@ private:
     }
 
     bool keeps_energy(int lane) {
-        SmallClock<real>& watch = small_clock[lane];
-        if (!watch.is_small(lane_of(motion.fixed_point.elapsed, lane) / step_size)) return true;
+        WatchedClock<real>& watch = watched_clock[lane];
+        if (!watch.is_suspect(lane_of(motion.fixed_point.elapsed, lane) / step_size)) return true;
         real q[n], p[n];
         this->state_of(lane, q, p);
         return watch.keeps_energy(single, q, p);

@@ -106,12 +106,7 @@ private:
     int sample_count{};
 
     // For formulas; with a clock a sum over nodes.
-    real time_at(real theta) const {
-        if constexpr (K::autonomous)
-            return real(0);
-        else
-            return Between<K>::time(*step, theta);
-    }
+    real time_at(real theta) const { return K::autonomous ? real(0) : Between<K>::time(*step, theta); }
 
     void on_grid(int i) {
         if constexpr (S::basis > 0) {

@@ -342,7 +342,7 @@ TEST_CASE("a machine that refuses to write is an error of exit code 4") {
     const Place place;
     const test::Finished missing = place.run({pendulum, "-o", place.file("none/run.csv")});
     CHECK(missing.exit_code == 4);
-    CHECK(missing.err == "lobatto: cannot write the trajectory to " + place.file("none/run.csv.partial") +
+    CHECK(missing.err == "lobatto: cannot write results to " + place.file("none/run.csv") +
                              ": No such file or directory. Create its folder first, or choose another place with -o\n");
     const test::Finished full = place.run({pendulum, "-o", "/dev/full", "--quiet"});
     CHECK(full.exit_code == 4);

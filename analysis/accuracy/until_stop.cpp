@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-#include "analysis/until_stop.hpp"
+#include "analysis/accuracy/until_stop.hpp"
 
 #include <utility>
 
