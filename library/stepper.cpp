@@ -228,7 +228,7 @@ struct Stepper::Parts {
         call.tolerance = kernel.parts().start.tolerance;
         call.interval = std::numeric_limits<double>::infinity();
         call.end = arrival;
-        if (is_clocked()) {
+        if (is_clocked() && stepper.kernel()->real_kind == LOBATTO_DOUBLE) {
             chain.resize(1 + 2 * n());
             call.chain = chain.data();
         }

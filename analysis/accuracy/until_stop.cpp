@@ -6,6 +6,7 @@
 #include "analysis/kernel/derived_kernel.hpp"
 #include "analysis/kernel/kernel_of.hpp"
 #include "analysis/motion.hpp"
+#include "runtime/stopwatch.hpp"
 
 namespace lobatto {
 
@@ -18,6 +19,11 @@ Scene ending_at_stop(Scene scene) {
     LoadedStepper<double> stepper(kernel);
     TrajectoryRequest request = request_of(looking, steps_of(looking).count, stepper);
     request.events = [](const EventRecords&) {};  // stops are sought with them
+    constexpr double longest = 2;                 // seconds
+    const Stopwatch watch;
+    volatile int is_late = 0;
+    request.interrupted = &is_late;
+    request.progress = [&](std::int64_t) { is_late = watch.seconds() > longest ? 1 : 0; };
     const TrajectoryResult result = integrate(kernel, request);
     if (result.stop < 0 || result.steps_done == 0) return scene;
     scene.run.until = scene.clock ? GiNaC::numeric(result.time)

@@ -6,8 +6,8 @@
 
 namespace lobatto {
 
-// The scene with the last step before its stop as the end time, if the motion meets one: for commands that look at a
-// motion to its end, and at what is beyond a stop in no case. Other scenes come back as they are.
+// The scene with the last step before its stop as the end time, with a clock the stop itself: for commands that look at
+// a motion to its end. As it is where there is no stop, or none after the first step and within two seconds.
 Scene ending_at_stop(Scene scene);
 
 }  // namespace lobatto

@@ -47,14 +47,14 @@ std::vector<std::string> names_in(const std::string& list) {
     return names;
 }
 
-// Whether a column says again what x says, as the coordinate `time` of a clock does.
-bool repeats(const NumberTable::Column& x, const NumberTable::Column& column) {
-    double largest = 0, apart = 0;
-    for (std::size_t i = 0; i < x.values.size(); ++i) {
-        largest = std::fmax(largest, std::fabs(x.values[i]));
-        apart = std::fmax(apart, std::fabs(column.values[i] - x.values[i]));
-    }
-    return x.values.size() > 1 && apart <= 1e-9 * largest;
+// Whether a column is the coordinate `time` of a clock, and says again what x says.
+bool repeats(const NumberTable& table, const NumberTable::Column& x, const NumberTable::Column& column) {
+    if (!column.name.starts_with("time") || !table.has("p_" + column.name)) return false;
+    double largest = 0;
+    for (const double value : x.values) largest = std::fmax(largest, std::fabs(value));
+    for (std::size_t i = 0; i < x.values.size(); ++i)
+        if (!(std::fabs(column.values[i] - x.values[i]) <= 1e-9 * largest)) return false;
+    return true;
 }
 
 // All but x and the momenta, a panel each, as far as there is room: the energy last.
@@ -62,7 +62,7 @@ std::vector<std::vector<std::string>> panels_of(const NumberTable& table, const 
     std::vector<std::vector<std::string>> panels;
     for (const NumberTable::Column& column : table.columns)
         if (column.name != x && !column.name.starts_with("p_") && column.name != "H" &&
-            !repeats(table.column(x), column))
+            !repeats(table, table.column(x), column))
             panels.push_back({column.name});
     const bool has_energy = table.has("H") && x != "H";
     panels.resize(std::min(panels.size(), most_panels - (has_energy ? 1 : 0)));

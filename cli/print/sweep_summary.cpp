@@ -164,16 +164,17 @@ std::string failures_text(const SweepStudy& study, const SweepTally& tally) {
     const auto some = [&](std::initializer_list<int> statuses) {
         return std::any_of(statuses.begin(), statuses.end(), [&](int status) { return tally.count_of(status) > 0; });
     };
-    text += "\nTry ";
+    std::string advice;
     if (some({LOBATTO_NOT_CONVERGED, LOBATTO_NOT_FINITE, LOBATTO_SINGULAR_JACOBIAN, LOBATTO_TIME_STANDS_STILL, departed,
               unresolved}))
-        text += "a smaller --step, ";
-    if (some({unresolved})) text += "an earlier end, --beyond-horizon for the statistics of chaos, ";
-    return text + "or leave these values out.";
+        advice += "a smaller --step, ";
+    if (some({unresolved})) advice += "--beyond-horizon for the statistics of chaos, ";
+    if (some({unresolved, LOBATTO_IMPACTS_ACCUMULATE})) advice += "an earlier end, ";
+    return text + (advice.empty() ? "\nLeave these values out." : "\nTry " + advice + "or leave these values out.");
 }
 
 void warn_of_errors(const SweepStudy& study, const SweepTally& tally) {
-    if (study.starts().settings() == 1) warn_of_fixed_times(study.scene(), study.starts());
+    warn_of_fixed_times(study.scene(), study.starts());
     const Worst worst = tally.worst_error();
     if (worst.index >= 0 && worst.value > large_error)
         tell(

@@ -322,7 +322,8 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
     std::vector<double> energies;
     std::vector<std::vector<double>> motion;
     std::vector<double> velocity, ignored, slope;
-    std::vector<double> energy_sizes;
+    std::vector<double> kinetic_energies;
+    double energy_size = 0;
     LoadedStepper<double> stepper(kernel);
     if (stepper.prepare(parameters, step) != LOBATTO_OK)
         throw ComputationError("the energy cannot be followed: the kernel refuses the scene's values");
@@ -347,7 +348,8 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
             // Rounding of q_k costs V its slope times that: sum |q_k dV/dq_k|.
             stepper.slopes(row[-1], motion.back(), velocity, ignored, slope);
             for (std::size_t k = 0; k < n; ++k) sizes += std::fabs(row[k] * slope[k]);
-            energy_sizes.push_back(sizes);
+            energy_size = std::max(energy_size, sizes);
+            kinetic_energies.push_back(kinetic);
         }
     };
     const TrajectoryResult run = integrate(kernel, request);
@@ -355,10 +357,10 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
     result.steps = run.steps_done;
     const std::size_t half = energies.size() / 2;
     if (half == 0) throw ComputationError("the energy cannot be followed: the first step fails");
-    std::vector<double> reach(2, 0.0), mean(2, 0.0), energy_size(2, 0.0);
+    std::vector<double> reach(2, 0.0), mean(2, 0.0), moving(2, 0.0);
     for (std::size_t i = 0; i < 2 * half; ++i) {
         const std::size_t part = i < half ? 0 : 1;
-        energy_size[part] = std::max(energy_size[part], energy_sizes[i]);
+        moving[part] = std::max(moving[part], kinetic_energies[i]);
         mean[part] += (energies[i] - energies[0]) / static_cast<double>(half);
         for (std::size_t k = 0; k < n; ++k) reach[part] = std::max(reach[part], std::fabs(motion[i][k] - q[k]));
     }
@@ -366,11 +368,9 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
     result.swing = *most - *least;
     result.drift = std::fabs(mean[1] - mean[0]);
     // Rounding of the energy itself, and of the steps: a periodic motion repeats it, so that it adds up.
-    result.rounding =
-        rounding_of<double>() * std::max(energy_size[0], energy_size[1]) * (8 + static_cast<double>(result.steps) / 4);
-    // Four times as far: a fall; more than three times the size of what the energy is a sum of: an escape in a turning
-    // frame.
-    result.bounded = reach[1] <= 3 * reach[0] && energy_size[1] <= 3 * energy_size[0];
+    result.rounding = rounding_of<double>() * energy_size * (8 + static_cast<double>(result.steps) / 4);
+    // Four times as far: a fall; farther, and faster: an escape in a turning frame.
+    result.bounded = reach[1] <= 3 * reach[0] && !(reach[1] > 1.5 * reach[0] && moving[1] > 1.5 * moving[0]);
     // The same run from a start disturbed by 1e-12 of the region: how far it is from this one in the last tenth.
     constexpr double disturbance = 1e-12, most_growth = 1e7;
     const double region = std::max(reach[0], reach[1]);

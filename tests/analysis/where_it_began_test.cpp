@@ -74,7 +74,7 @@ TEST_CASE("the error of an escape is measured at its stop, whatever end was aske
         INFO(swept.err);
         CHECK(swept.exit_code == 0);
         const double in_table = test::read_trajectory(folder / "sweep.csv").rows.back().back() * largest;
-        CHECK(in_table > error / 5);
-        CHECK(in_table < error * 5);
+        CHECK(in_table > error / 5);  // of another companion
+        CHECK(in_table < error * 10);
     }
 }

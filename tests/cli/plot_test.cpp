@@ -56,7 +56,7 @@ TEST_CASE("a trajectory becomes a picture: SVG, PNG, characters") {
 TEST_CASE("a column that says again what the time says has no panel unless it is asked for") {
     const test::TemporaryFolder folder;
     const std::string table = folder / "clocked.csv", svg = folder / "clocked.svg";
-    test::write_text(table, "t,time,angle\n0,0,1\n1,1,2\n2,2.0000000000000004,5\n");
+    test::write_text(table, "t,time,angle,p_time\n0,0,1,3\n1,1,2,3\n2,2.0000000000000004,5,3\n");
     CHECK(plot({table, "-o", svg}).exit_code == 0);
     CHECK(test::read_file(svg).find(">angle<") != std::string::npos);
     CHECK(test::read_file(svg).find(">time<") == std::string::npos);

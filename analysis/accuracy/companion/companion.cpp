@@ -274,8 +274,8 @@ CompanionPlace Companion::place_after(std::size_t comparisons) {
     return place;
 }
 
-// From the last comparison before the stop to there, if the companion has come so far.
-void Companion::compare_at_stop() {
+// From the last comparison before the stop to there, if the companion has come so far. `longest`: seconds.
+void Companion::compare_at_stop(double longest) {
     if (stop_time_.empty() || companion_.size() < run_.size()) return;
     companion_.resize(run_.size());
     companion_ranges_.resize(run_.size());
@@ -294,9 +294,17 @@ void Companion::compare_at_stop() {
         const double wanted = std::ceil(way.front() / request_.step * ratio_of(segment(0)));
         const std::int64_t steps = std::max<std::int64_t>(1, std::llround(wanted));
         const std::vector<double> step = times_fraction(way, 1, steps);
-        for (std::int64_t i = 0; i < steps && place.status == LOBATTO_OK; ++i) {
-            take_finely(place, from + static_cast<double>(i) * step.front(), step);
-            if (parts_ == 1) place.time[0] = from + static_cast<double>(i + 1) * step.front();
+        const bool is_even = pulses_.empty() && knots_.empty() && narrow_.empty() && !contacts_.is_sought();
+        const Stopwatch watch;
+        for (std::int64_t done = 0; done < steps && place.status == LOBATTO_OK;) {
+            if (watch.seconds() > longest) return;
+            if (is_even) {
+                place.set_step(step, request_.whole_parameters);
+                done += place.advance(std::min(steps - done, most_at_once), request_.tolerance);
+            } else {
+                take_finely(place, from + static_cast<double>(done++) * step.front(), step);
+                if (parts_ == 1) place.time[0] = from + static_cast<double>(done) * step.front();
+            }
         }
     } else {
         return;  // the stop is the last comparison
@@ -427,7 +435,9 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
     }
     cancelled_ = true;
     if (thread_.joinable()) thread_.join();
-    if (has_end && result.stop >= 0) compare_at_stop();
+    if (has_end && result.stop >= 0)
+        compare_at_stop(is_finer_ || result.seconds < short_run ? std::numeric_limits<double>::infinity()
+                                                                : result.seconds / 2);
     if (!has_end || run_.empty() || (companion_.empty() && !stopped_)) return std::nullopt;
     return compare(result);
 }

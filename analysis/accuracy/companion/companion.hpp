@@ -93,7 +93,7 @@ private:
     double time_of(const Point& point) const;
     Point point_of(const Records& records, std::int64_t row, std::int64_t steps) const;
     CompanionPlace place_after(std::size_t comparisons);
-    void compare_at_stop();
+    void compare_at_stop(double longest);
     Segment segment(std::size_t number) const;
     bool is_clocked() const { return request_.arrivals.interval != 0; }
     double ratio_of(const Segment& part) const;

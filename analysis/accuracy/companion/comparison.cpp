@@ -141,7 +141,12 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
 // A wrong motion may grow, and its amplitude with it. When it began to be wrong is told by the amplitude until then.
 void Companion::lose_where_it_began(MeasuredError& error, const std::vector<double>& amplitude, double of_run) const {
     constexpr double least = 1e-3;  // of the amplitude: what is less may be rounding
+    constexpr int in_a_row = 3;     // comparisons, or all until it was lost by the whole amplitude
     Range range;
+    const std::vector<double> start = row_at(0);
+    widen_to(range.least, range.most, start.data() + 1, start.size() - 1);
+    int lost = 0;
+    std::vector<double> began;
     for (std::size_t j = 0; time_of(run_[j]) != *error.lost_after; ++j) {
         const std::vector<double> here = row_at(j + 1);
         for (const std::vector<double>& row :
@@ -152,10 +157,11 @@ void Companion::lose_where_it_began(MeasuredError& error, const std::vector<doub
             until_then[i] = std::fmin(amplitude[i], std::fmax(until_then[i], least * amplitude[i]));
         const Distance distance =
             distance_between(run_[j].row.data(), companion_[j].row.data(), parts_, until_then, of_run);
-        if (!distance.is_lost()) continue;
-        lose(error, here[0], {here.begin() + 1, here.end()});
-        return;
+        lost = distance.is_lost() ? lost + 1 : 0;
+        if (lost == 1) began = here;
+        if (lost == in_a_row) break;
     }
+    if (lost > 0) lose(error, began[0], {began.begin() + 1, began.end()});
 }
 
 MeasuredError Companion::compare(const TrajectoryResult& result) const {

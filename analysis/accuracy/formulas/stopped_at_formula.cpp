@@ -153,7 +153,8 @@ std::string escape_of(const Scene& scene, const std::vector<double>& velocity, d
 
 std::string stopped_at_formula(const Scene& scene, const Domains& domains, const Kernel& kernel,
                                const TrajectoryRequest& request, const TrajectoryResult& result) {
-    const bool has_failed = result.status == LOBATTO_NOT_FINITE || result.status == LOBATTO_NOT_CONVERGED;
+    const bool has_failed = result.status == LOBATTO_NOT_FINITE || result.status == LOBATTO_NOT_CONVERGED ||
+                            (scene.clock && result.status == LOBATTO_TIME_STANDS_STILL);
     if (!has_failed || !result.started) return "";
     const std::optional<std::vector<double>> velocity = velocity_at_stop(kernel, request, result);
     if (!velocity) return "";

@@ -126,6 +126,7 @@ private:
             evaluate_nodes(this->time(), q, p, a.Y, a);
             // Formulas may have no value there, as beyond the speed of light: half of the increment, and half of that.
             for (int halving = 0; iteration > 1 && halving < most_halvings && !has_values(a); ++halving) {
+                previous *= real(0.5);
                 for (int i = 0; i < N; ++i) {
                     a.delta[i] *= real(0.5);
                     a.Y[i] -= a.delta[i];

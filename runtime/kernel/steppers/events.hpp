@@ -385,7 +385,8 @@ private:
                 if (changes(last, here.value)) {
                     const int from = before >= 0 ? before : 0;
                     // Of a constant, and of what holds identically, rounding alone changes the sign.
-                    if (!is_wall(e) && is_rounding(here.theta, e) && is_rounding(samples[from].theta, e)) continue;
+                    if (!is_beyond && !is_wall(e) && is_rounding(here.theta, e) && is_rounding(samples[from].theta, e))
+                        continue;
                     const int direction = ((here.value > real(0)) == (step->step_size > real(0))) ? 1 : -1;
                     if (K::event_direction[e] * direction >= 0) {
                         const bool is_exactly = zero >= 0 && samples[zero].value == real(0);
