@@ -167,12 +167,14 @@ private:
         way.start(0, start_.q, start_.p);
         States states = way.state();
         states.reserve(static_cast<std::size_t>(samples + 1) * 2 * n_);
-        for (int i = 1; i <= samples; ++i) {
+        way.set_watch([&] {
             check_interruption();
-            if (!way.advance_to(static_cast<real>(request_.until) * real(i) / real(samples))) return std::nullopt;
-            states.insert(states.end(), way.state().begin(), way.state().end());
             if (watch_.seconds() > (quick ? half : overtime) * request_.seconds_limit)
                 fail_slow(static_cast<double>(way.time()) / (quick ? precise_factor : 1));
+        });
+        for (int i = 1; i <= samples; ++i) {
+            if (!way.advance_to(static_cast<real>(request_.until) * real(i) / real(samples))) return std::nullopt;
+            states.insert(states.end(), way.state().begin(), way.state().end());
         }
         evaluations_ = way.evaluations();
         if (quick) set_scale(way.least(), way.most(), tolerance);

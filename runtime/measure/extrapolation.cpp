@@ -110,6 +110,7 @@ bool Extrapolation<real>::advance_to(real time) {
     const real way = time - time_;
     if (longest_ == real(0)) longest_ = way;
     while (time_ < time) {
+        if (watch_) watch_();
         const real left = time - time_;
         // Equal parts of what is left.
         const auto parts = std::max<std::int64_t>(

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <utility>
 #include <vector>
 
 #include "runtime/build/library.hpp"
@@ -25,6 +27,8 @@ public:
     // To `time`, which is later; false when the formulas fail or the steps become too short. The first macro step tried
     // is the whole way, later ones go by experience.
     bool advance_to(real time);
+    // Called before each macro step, for those who do not wait for ever: it may throw.
+    void set_watch(std::function<void()> watch) { watch_ = std::move(watch); }
 
     real time() const { return time_; }
     const std::vector<real>& state() const { return y_; }  // 2n: q, p
@@ -48,6 +52,7 @@ private:
     std::vector<real> y_, f0_, q_, p_, v_, Lv_, Lq_, lambda_, phi_, phi_t_, G_;
     std::vector<std::vector<real>> table_;
     std::int64_t evaluations_ = 0;
+    std::function<void()> watch_;
 };
 
 }  // namespace lobatto
