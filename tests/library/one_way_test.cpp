@@ -114,8 +114,8 @@ TEST_CASE("words that settings do not know, and settings that a call has no use 
     CHECK(
         run_with(settings([](lob::Settings& all) { all.tolerance = -1; })).starts_with("the tolerance is -1; it must"));
     const auto longer = settings([](lob::Settings& all) { all.step = "0.1"; });
-    CHECK(refusal_of([&] { lob::verify(scene, longer); }).second ==
-          "verify takes the scene's own values; leave out 'step', or write it into the scene");
+    CHECK(refusal_of([&] { lob::verify(scene, settings([](lob::Settings& all) { all.until = "5"; })); }).second ==
+          "verify takes the scene's own values; leave out 'until', or write it into the scene");
     CHECK(refusal_of([&] { static_cast<void>(scene.emit(longer)); }).second.starts_with("emit takes the scene's own"));
     CHECK(refusal_of([&] { lob::tune(scene, 1e-4, longer); }).second ==
           "tune chooses the method, its numbers, the clock and the step; leave them out of the settings");
