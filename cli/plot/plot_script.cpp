@@ -99,6 +99,16 @@ bool are_lengths(const NumberTable::Column& x, const NumberTable::Column& y) {
            x.name.substr(1) == y.name.substr(1) && x.name != y.name;
 }
 
+// From the least to the largest of the values that are numbers.
+double extent_of(const NumberTable::Column& column) {
+    double least = HUGE_VAL, most = -HUGE_VAL;
+    for (const double value : column.values) {
+        least = std::fmin(least, value);
+        most = std::fmax(most, value);
+    }
+    return most - least;
+}
+
 bool is_seen(double value, bool log) {
     return std::isfinite(value) && (!log || value > 0);
 }
@@ -183,6 +193,9 @@ std::string plot_script(const std::vector<NumberTable>& tables, const std::vecto
         // In a phase portrait of two lengths, and in no other picture, both axes have one scale.
         const bool equal = are_lengths(first_x, first_y) && !request.log_x && !request.log_y && in_colour;
         panels += equal ? "set size ratio -1\n" : "set size noratio\n";
+        // Numbers beside one another need room: in a narrow picture they stand upright.
+        panels += equal && extent_of(first_x) < 0.4 * extent_of(first_y) ? "set xtics rotate by 90 right\n"
+                                                                         : "set xtics norotate\n";
         panels += request.y.size() > 1 && !is_last
                       ? "unset xlabel\nset format x \"\"\n"
                       : fmt::format("set xlabel {}\nset format x \"{}\"\n", gnuplot_text(label_of(first_x)),
