@@ -369,7 +369,7 @@ EnergyDrift energy_drift(const Kernel& kernel, const std::vector<double>& parame
     result.drift = std::fabs(mean[1] - mean[0]);
     // Rounding of the energy itself, and of the steps: a periodic motion repeats it, so that it adds up.
     result.rounding = rounding_of<double>() * energy_size * (8 + static_cast<double>(result.steps) / 4);
-    // Four times as far: a fall; farther, and faster: an escape in a turning frame.
+    // Four times as far: a fall; farther, and faster: an escape in a rotating frame.
     result.bounded = reach[1] <= 3 * reach[0] && !(reach[1] > 1.5 * reach[0] && moving[1] > 1.5 * moving[0]);
     // The same run from a start disturbed by 1e-12 of the region: how far it is from this one in the last tenth.
     constexpr double disturbance = 1e-12, most_growth = 1e7;

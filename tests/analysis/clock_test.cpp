@@ -277,7 +277,7 @@ TEST_CASE("a solution of a step that lies far away is not taken") {
     for (const auto& row : test::read_trajectory(folder / "run.csv").rows) CHECK(row[0] <= 60);
 }
 
-TEST_CASE("the clock auto follows escapes in a turning frame") {
+TEST_CASE("the clock auto follows escapes in a rotating frame") {
     // Hill's problem, away from the planet: with steps that grow like r^(3/2) the run stopped at t = 1.55.
     const Scene scene = scene_of(
         "lagrangian = \"(x'^2 + y'^2)/2 + x*y' - y*x' + 3/2*x^2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
@@ -585,7 +585,7 @@ TEST_CASE("the last part of a step that runs far out is measured, too") {
     CHECK(printed < truth * 4);
 }
 
-TEST_CASE("a run with a clock that leaves its energy by half of the motion's ends with that") {
+TEST_CASE("a run with a clock that leaves its energy stops there, and says so") {
     const test::TemporaryFolder folder;
     const std::string path = folder / "scene.toml";
     test::write_text(path,

@@ -112,7 +112,7 @@ TEST_CASE("a pulse on a chain may have tails below the range of numbers, and mom
     CHECK(numbers[7] == numbers[8]);
 }
 
-TEST_CASE("verify looks at a table where it has values, and judges no energy of an escape in a turning frame" *
+TEST_CASE("verify looks at a table where it has values, and judges no energy of an escape in a rotating frame" *
           doctest::test_suite("slow")) {
     const test::TemporaryFolder folder;
     test::write_text(folder / "rho.csv",

@@ -229,7 +229,7 @@ TEST_CASE("a force that fades far out is no equilibrium, and a length no angle")
 
 TEST_CASE("frequencies are met along a motion whose velocities couple the coordinates, and their absence is said") {
     const test::TemporaryFolder folder;
-    // In a turning frame: two springs of frequency 10, seen at 9 and 11.
+    // In a rotating frame: two springs of frequency 10, seen at 9 and 11.
     const auto turning =
         report_of({scene_in(folder, "((x' - y)^2 + (y' + x)^2)/2 - 50*(x^2 + y^2) - 1e-6*x^4",
                             "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }")});

@@ -199,7 +199,7 @@ std::optional<TimeScale> time_scale_of(const Pole& pole, const Symbols& position
 }
 
 // How fast a motion is by each pole, and omega^2 of what is the same everywhere: springs and centrifugal forces, by the
-// trace of M^-1 d2L/dq dq, turning frames and uniform magnetic fields, by (d2L/dq_i dq'_j - d2L/dq_j dq'_i)^2 / m_i
+// trace of M^-1 d2L/dq dq, rotating frames and uniform magnetic fields, by (d2L/dq_i dq'_j - d2L/dq_j dq'_i)^2 / m_i
 // m_j.
 struct TimeScales {
     std::vector<TimeScale> poles;
