@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Many trajectories side by side in vector registers, from a kernel alone: eight pendulums and their starts.
-//   g++ -std=c++17 -O2 -march=native -ffp-contract=off -I generated -I runtime/kernel examples/ensemble.cpp -o ensemble
+//   g++ -std=c++17 -O3 -march=native -ffp-contract=off -I generated -I runtime/kernel examples/ensemble.cpp -o ensemble
 #include <cstdint>
 #include <cstdio>
 

@@ -61,7 +61,7 @@ void print_use(const KernelSource& source, const EmitCommand& options, const Sce
     fmt::print(
         std::cout,
         "\nUse it:\n"
-        "  #include \"{0}.hpp\"  // g++ -std={1}17 -O2 -march=native -ffp-contract=off{2} -I {3} program.cpp{4}\n"
+        "  #include \"{0}.hpp\"  // g++ -std={1}17 -O3 -march=native -ffp-contract=off{2} -I {3} program.cpp{4}\n"
         "  lobatto::{5}<lobatto::kernels::{0}> stepper;\n"
         "{8}  stepper.prepare({{}}, h); stepper.start(t, q, p); stepper.step();  // state: stepper.time(), .{6}, "
         ".momentum(p){7}\n",

@@ -275,18 +275,21 @@ class Chart {
         }
     }
     colour(i) { return palette[(this.curves[i].colour ?? i) % palette.length]; }
-    static number(value) {
-        const size = Math.abs(value);
-        return size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(1) : String(+value.toPrecision(3));
+    // With the digits by which it differs from a number `step` away.
+    static number(value, step) {
+        const size = Math.abs(value), digits = size > step ? Math.min(17, Math.ceil(Math.log10(size / step) + 1.001)) : 1;
+        const plain = size === 0 || (size >= 1e-3 && size < 1e5);
+        return plain ? String(+value.toPrecision(Math.max(3, digits))) : value.toExponential(Math.max(1, digits - 1));
     }
-    // Round numbers between two others.
+    // Round numbers between two others, and what is written beside each.
     static ticks(low, high, count) {
         const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
         const step = [1, 2, 5, 10].map(s => s * power).find(s => s >= rough * 0.999), result = [];
-        for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) result.push(k * step);
+        for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k)
+            result.push([k * step, Chart.number(k * step, step)]);
         return result;
     }
-    scales(width, height) {
+    scales(context, width, height) {
         let low = Infinity, high = -Infinity, left = 0, right = end;
         if (this.options.phase) { left = Infinity; right = -Infinity; }
         for (const curve of this.curves) {
@@ -296,7 +299,8 @@ class Chart {
         const widen = (a, b) => b > a ? [a - 0.06 * (b - a), b + 0.06 * (b - a)] : [a - (Math.abs(a) || 1) * 0.1, b + (Math.abs(b) || 1) * 0.1];
         [low, high] = widen(low, high);
         if (this.options.phase) [left, right] = widen(left, right);
-        this.left = 50;
+        this.ticks = Chart.ticks(low, high, Math.max(2, height / 45));
+        this.left = 10 + Math.max(40, ...this.ticks.map(([, label]) => context.measureText(label).width));
         this.x = value => this.left + (value - left) / (right - left || 1) * (width - this.left - 10);
         this.y = value => 6 + (high - value) / (high - low) * (height - 26);
         this.range = [left, right, low, high];
@@ -306,17 +310,17 @@ class Chart {
         const context = this.picture.getContext("2d");
         context.setTransform(ratio, 0, 0, ratio, 0, 0);
         this.names.forEach((name, i) => { name.style.color = this.colour(i); });
-        this.scales(width, height);
-        const [left, right, low, high] = this.range;
         context.font = "11px system-ui, sans-serif";
+        this.scales(context, width, height);
+        const [left, right] = this.range;
         context.strokeStyle = ink.line; context.fillStyle = ink.soft; context.lineWidth = 1;
         context.textAlign = "right"; context.textBaseline = "middle";
-        for (const tick of Chart.ticks(low, high, Math.max(2, height / 45))) {
+        for (const [tick, label] of this.ticks) {
             context.beginPath(); context.moveTo(this.left, this.y(tick)); context.lineTo(width - 10, this.y(tick)); context.stroke();
-            context.fillText(Chart.number(tick), this.left - 6, this.y(tick));
+            context.fillText(label, this.left - 6, this.y(tick));
         }
         context.textAlign = "center"; context.textBaseline = "top";
-        for (const tick of Chart.ticks(left, right, Math.max(2, width / 90))) context.fillText(Chart.number(tick), this.x(tick), height - 16);
+        for (const [tick, label] of Chart.ticks(left, right, Math.max(2, width / 90))) context.fillText(label, this.x(tick), height - 16);
         this.curves.forEach((curve, i) => this.curve(context, curve, i, width));
         if (this.curves.some(curve => curve.run.events.length) && !this.options.phase) this.marks(context, height);
     }
