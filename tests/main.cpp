@@ -83,6 +83,7 @@ constexpr const char* compiled_quickly[] = {
     "/analysis/impacts_test.cpp",
     "/analysis/measured_test.cpp",
     "/analysis/near_cuts_test.cpp",
+    "/analysis/pulses_test.cpp",
     "/analysis/taken_steps_test.cpp",
     "/analysis/tradeoff_kinds_test.cpp",
     "/analysis/tradeoff_test.cpp",

@@ -232,7 +232,7 @@ void shift_resting(Shifts& of, const std::vector<__float128>& T) {
                    most_size = most(sizes, block) > 0 ? most(sizes, block) : alone,
                    most_shift = std::min(most(shifts, block) > 0 ? most(shifts, block) : alone, real(1e-6) * most_size);
         for (std::size_t i = block; i < block + n; ++i) {
-            if (sizes[i] > 0) {
+            if (sizes[i] > real(1e-20) * most_size) {  // less is the rounding of what moves the others
                 shifts[i] = std::max(shifts[i], real(1e-14) * sizes[i]);
             } else {
                 sizes[i] = most_size;
@@ -255,6 +255,11 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
     Shifts found = own_shifts(stepper, start, step, joined(q1, p1), T);
     shift_resting(found, T);
     const auto& [sizes, shifts] = found;
+    // Of images: forces of large terms that cancel move what hardly moves, too.
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(n);
+    const real roundings = 64 * rounding_of<real>();
+    const std::array<real, 2> rounding = {roundings * *std::max_element(sizes.begin(), middle),
+                                          roundings * *std::max_element(middle, sizes.end())};
     double defect = 0;
     for (std::size_t j = 0; j < rows; ++j) {
         const auto image = [&](real shift) {
@@ -275,8 +280,9 @@ double tangent_defect(const Kernel& kernel, const QuadrupleStart& start, double 
             real largest = 0, difference = 0;
             for (std::size_t i = 0; i < rows; ++i) {
                 const real slope = (8 * (f1[i] - b1[i]) - (f2[i] - b2[i])) / (12 * e);
+                const real apart = magnitude(T[i * rows + j] - slope) - rounding[i / n] / e;
                 largest = std::max(largest, magnitude(T[i * rows + j]) / sizes[i]);
-                difference = std::max(difference, magnitude(T[i * rows + j] - slope) / sizes[i]);
+                difference = std::max(difference, apart / sizes[i]);
             }
             if (best < 0 || difference / largest < best) best = difference / largest;
         }

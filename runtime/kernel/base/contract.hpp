@@ -107,14 +107,9 @@ constexpr Stepping stepping_of() {
         return Stepping::solved;
 }
 template <class K>
-constexpr bool is_clean() {
-    return stepping_of<K>() == Stepping::clean;
-}
-
+constexpr bool is_clean = stepping_of<K>() == Stepping::clean;
 template <class K>
-constexpr bool is_clocked() {
-    return stepping_of<K>() == Stepping::clocked;
-}
+constexpr bool is_clocked = stepping_of<K>() == Stepping::clocked;
 
 // Systems with constant mass have none: what pulls on coordinates is of the general form.
 template <class K>

@@ -131,7 +131,7 @@ struct Export {
     }
 
     static void state(const void* stepper, void* time, void* q, void* p) {
-        if constexpr (is_clocked<K>()) {
+        if constexpr (is_clocked<K>) {
             *out(time) = of(stepper).arrival_time;
             for (int k = 0; k < n; ++k) {
                 out(q)[k] = of(stepper).arrival_q[k];
@@ -145,7 +145,7 @@ struct Export {
     }
 
     static void read_two_fold(const void* stepper, void* q, void* q_rest, void* velocity, void* velocity_rest) {
-        if constexpr (is_clean<K>()) {
+        if constexpr (is_clean<K>) {
             for (int k = 0; k < n; ++k) {
                 out(q)[k] = of(stepper).q[k];
                 out(q_rest)[k] = of(stepper).q_rest[k];
@@ -154,7 +154,7 @@ struct Export {
             }
         }
     }
-    static constexpr auto two_fold_state = is_clean<K>() ? read_two_fold : nullptr;
+    static constexpr auto two_fold_state = is_clean<K> ? read_two_fold : nullptr;
 
     static std::int32_t dense(const void* stepper, const void* theta, void* q, void* velocity) {
         if constexpr (has_dense) {
@@ -281,7 +281,7 @@ struct Export {
                                              K::order,
                                              S::N,
                                              K::autonomous ? 1 : 0,
-                                             is_clocked<K>() ? 1 : 0,
+                                             is_clocked<K> ? 1 : 0,
                                              K::linear ? 1 : 0,
                                              constraint_count,
                                              K::has_energy ? 1 : 0,
@@ -332,8 +332,8 @@ template <class K, int lanes = (impacts_of<K>() + switches_of<K>() > 0) ? 0 : re
 using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportRefilled<K, lanes>>, Export<K>>;
 #elif defined(LOBATTO_ENSEMBLES)
 template <class K, int lanes = (stops_of<K>() + impacts_of<K>() + switches_of<K>() > 0) ? 0
-                               : is_clocked<K>()                                        ? clocked_lanes<K>()
-                                                 : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
+                               : is_clocked<K>                                          ? clocked_lanes<K>()
+                                               : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
 using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportSide<K, lanes>>, Export<K>>;
 #else
 template <class K>

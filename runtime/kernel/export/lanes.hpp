@@ -85,7 +85,7 @@ struct ExportClocked : ExportLanes<K, ClockedEnsemble<K, width>> {
 };
 
 template <class K, int width>
-using ExportSide = std::conditional_t<is_clocked<K>(), ExportClocked<K, width>, ExportEnsemble<K, width>>;
+using ExportSide = std::conditional_t<is_clocked<K>, ExportClocked<K, width>, ExportEnsemble<K, width>>;
 
 #ifdef LOBATTO_REFILLED
 template <class K, int width>

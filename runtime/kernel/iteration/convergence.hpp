@@ -47,23 +47,15 @@ struct Convergence {
 
 private:
     static constexpr real raised(real x) { return power == 2 ? x * x : x; }
-    LOBATTO_INLINE static bool either(bool a, bool b) { return a || b; }
-    LOBATTO_INLINE static bool both(bool a, bool b) { return a && b; }
-    template <class Mask>
-    LOBATTO_INLINE static Mask either(const Mask& a, const Mask& b) {
-        return a | b;
-    }
-    template <class Mask>
-    LOBATTO_INLINE static Mask both(const Mask& a, const Mask& b) {
-        return a & b;
-    }
+    LOBATTO_INLINE static Truth either(const Truth& a, const Truth& b) { return a | b; }
+    LOBATTO_INLINE static Truth both(const Truth& a, const Truth& b) { return a & b; }
 };
 
 // Newton's iteration converges quadratically, e_next = C e^2: it ends as soon as the next increment would be rounding.
 // Increments that no longer shrink are rounding up to `noise` units of what they are computed from.
 template <class real>
 struct NewtonConvergence {
-    static constexpr int iteration_limit = 40, noise = 64;
+    static constexpr int iteration_limit = 40, noise = 64, noise_after = 4;
 
     static bool reached(int iteration, real e, real e_before) {
         return e <= Limits<real>::root_epsilon ||

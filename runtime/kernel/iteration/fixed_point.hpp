@@ -44,10 +44,11 @@ struct FixedPoint : StageMap<K, typename K::real> {
         real flat[n * parts * width], rate[n], inverse_scale[n], inverse_linear[n];
     };
 
-    real tolerance{};       // of increments, relative; 0: to rounding
-    real evaluations;       // of the last step
-    real increment;         // the last one of the last step, relative
-    real twentieth_norm{};  // h^2 |A| / 20
+    real tolerance{};        // of increments, relative; 0: to rounding
+    real least_increment{};  // what the rounding of forces moves positions by, where that is known
+    real evaluations;        // of the last step
+    real increment;          // the last one of the last step, relative
+    real twentieth_norm{};   // h^2 |A| / 20
     Workspace<Arrays> workspace;
     typename RefinementOf<K>::type refinement{};
 
@@ -159,15 +160,15 @@ private:
 
     // The stage equations; a.carried: W at the nodes.
     bool solve(const typename K::Coefficients& k, real time, const real* q, const real* u, Arrays& a) {
-        constexpr real floor = Limits<real>::epsilon / Limits<real>::root_epsilon;
+        constexpr real of_position = Limits<real>::epsilon / Limits<real>::root_epsilon;
         // Each coordinate has its own measures: increments as small as its rounding are so whatever the others do.
         const real small = maximum(tolerance, Limits<real>::epsilon);
         const real linear = maximum(Limits<real>::root_epsilon, sqrt(tolerance));  // where e^2 is no matter
         for (int c = 0; c < n; ++c) {
             const real W0 = w[c * s + s - 1];
             a.rate[c] = fused(-h * K::b[0], W0, u[c]);
-            const real scale = fabs(h * a.rate[c]) + fabs(h * (h * W0)) + floor * fabs(q[c]);
-            const real rounding = Limits<real>::epsilon * fabs(q[c]) + Limits<real>::smallest;
+            const real scale = fabs(h * a.rate[c]) + fabs(h * (h * W0)) + of_position * fabs(q[c]);
+            const real rounding = Limits<real>::epsilon * fabs(q[c]) + Limits<real>::smallest + least_increment;
             a.inverse_scale[c] = real(1) / maximum(scale, real(1) / small * rounding);
             a.inverse_linear[c] = real(1) / maximum(scale, real(8) / linear * rounding);
         }

@@ -54,14 +54,15 @@ struct NeighbourFixedPoint {
     real on_velocity[m];         // h c
     real weight[s], arrival[m];  // -h b and -h^2 b (1 - c)
     real h{};
-    real tolerance{};      // of increments, relative; 0: to rounding
-    real shrinking{};      // rho, as last measured; 0: never
-    real measured_for{};   // the tolerance
-    real noise{};          // increments to this tolerance that were rounding, and those up to twice as large
-    int until_measured{};  // steps
-    int interval{};        // between the last two measurements, in steps
-    int expected{};        // iterations of a quick step; 0: unknown
-    int late{};            // how many of the last quick steps, without a break, took more
+    real tolerance{};        // of increments, relative; 0: to rounding
+    real least_increment{};  // what the rounding of forces moves positions by, where that is known
+    real shrinking{};        // rho, as last measured; 0: never
+    real measured_for{};     // the tolerance
+    real noise{};            // increments to this tolerance that were rounding, and those up to twice as large
+    int until_measured{};    // steps
+    int interval{};          // between the last two measurements, in steps
+    int expected{};          // iterations of a quick step; 0: unknown
+    int late{};              // how many of the last quick steps, without a break, took more
     // Squares of increments that are small enough: on_rate v^2 + still, the latter as in the last careful step.
     real on_rate{};
     alignas(V) real still[room]{};
@@ -283,11 +284,12 @@ private:
         });
     }
     // What increments of coordinates that hardly move are measured against: the rounding of the largest displacement in
-    // a step. A blow must not be followed down to the denormal numbers that run ahead of it.
+    // a step, or that of forces. A blow must not be followed down to the denormal numbers that run ahead of it.
     real least_distance() const {
         V most = V(real(0));
         over_parts<InMemory>([&](int at) LOBATTO_FORMULA { most = maximum(most, displacement(at)); });
-        return Limits<real>::epsilon * minimum(largest(most), Limits<real>::largest / real(8));
+        return maximum(Limits<real>::epsilon * minimum(largest(most), Limits<real>::largest / real(8)),
+                       least_increment / bound());
     }
     LOBATTO_INLINE V displacement(int at) const {
         return V(fabs(h)) * (fabs(V::load(memory.rate + at)) + fabs(V(h) * V::load(w_end[now] + at)));

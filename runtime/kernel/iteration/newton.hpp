@@ -37,6 +37,7 @@ struct NewtonIteration {
         Status status;
         std::int32_t iterations;
         real increment;  // the last one, relative to the displacement within the step
+        real noise;      // what the rounding of forces moves positions by, where it ended the iteration
     };
 
     Status prepare(const Coefficients& k, real h) {
@@ -56,7 +57,7 @@ struct NewtonIteration {
     // step.
     Outcome solve(const Coefficients& k, real h, real time, const real* q, const real* W0, Arrays& a) {
         scale_increments(h, q, W0, a);
-        Outcome outcome{Status::not_converged, 0, real(0)};
+        Outcome outcome{Status::not_converged, 0, real(0), real(0)};
         if constexpr (is_frozen && K::linear) {
             correct_once(k, h, time, a, outcome);
         } else {
@@ -131,6 +132,17 @@ private:
         return true;
     }
 
+    // The largest increment where all are far below the largest displacement within the step; else 0. Where Newton's
+    // iteration does not make such increments smaller, they are the rounding of forces that cancel, as in exp(a) -
+    // exp(b): those of a coordinate that hardly moves may be much larger than its motion.
+    static real noise_of(const Arrays& a) {
+        real most = real(0), of_farthest = Limits<real>::largest;
+        for (int k = 0; k < n; ++k)
+            if (a.inverse_scale[k] > real(0)) of_farthest = minimum(of_farthest, a.inverse_scale[k]);
+        for (int i = 0; i < N; ++i) most = maximum(most, fabs(a.delta[i]));
+        return most * of_farthest <= Limits<real>::root_epsilon ? most : real(0);
+    }
+
     // At the end the accelerations are carried to the final positions to first order, which errs by the same e^2 as the
     // positions.
     static void newton(const Coefficients& k, real h, real time, Arrays& a, Outcome& outcome) {
@@ -150,8 +162,10 @@ private:
                 outcome.status = Status::not_finite;
                 return;
             }
-            if (K::linear || Rule::reached(iteration, e, previous) ||
-                (Rule::stagnates(iteration, e, previous) && is_rounding(h, a, a.S, K::entries, Rule::noise))) {
+            const bool stagnates = Rule::stagnates(iteration, e, previous);
+            if (stagnates && iteration > Rule::noise_after) outcome.noise = noise_of(a);
+            if (K::linear || Rule::reached(iteration, e, previous) || outcome.noise > real(0) ||
+                (stagnates && is_rounding(h, a, a.S, K::entries, Rule::noise))) {
                 stages.carry(a.S, K::entries, a.delta, a.W);
                 outcome.status = Status::ok;
                 return;

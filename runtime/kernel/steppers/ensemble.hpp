@@ -43,7 +43,7 @@ constexpr bool is_for_lanes() {
 template <class K>
 constexpr int ensemble_lanes(int trajectories) {
     constexpr int native = native_lanes<typename K::real>;
-    if (native == 1 || !K::any_number || is_clean<K>() || is_clocked<K>() || !is_for_lanes<K>()) return 0;
+    if (native == 1 || !K::any_number || is_clean<K> || is_clocked<K> || !is_for_lanes<K>()) return 0;
     if constexpr (K::form == Form::separable) {
         if (K::neighbours) return moves_immediately<K>() && trajectories >= native ? native : 0;
     }
@@ -186,7 +186,7 @@ protected:
     }
     // The same in the midst of a motion: one with a clock has what is known of its start among its parameters.
     Status go_on_alone(int lane, real time, const real* q, const real* p) {
-        if constexpr (is_clocked<K>()) {
+        if constexpr (is_clocked<K>) {
             const Status status = single.prepare(parameters[lane], step_size);
             return status == Status::ok ? single.start(time, q, p, single.known_of_start()) : status;
         } else {

@@ -18,10 +18,6 @@
 
 namespace lobatto {
 
-// ---------------------------------------------------------------------------------------------------------------------
-// The stepper
-// ---------------------------------------------------------------------------------------------------------------------
-
 // Whether iterations have neighbouring coordinates in lanes, not nodes.
 template <class K>
 constexpr bool along_coordinates() {
@@ -76,7 +72,14 @@ struct Stepper<K, Form::separable, Stepping::solved> : VelocityKept<K> {
         const Status status = this->begin(time, position, momentum, W + (s - 1) * n);
         has_history = false;
         is_current = true;
-        if constexpr (has_fixed_point) begin_fixed_point(fixed_point);
+        if constexpr (has_fixed_point) {
+            fixed_point.pause = Pause();
+            fixed_point.iteration.least_increment = real(0);
+            if constexpr (along_coordinates)
+                fixed_point.iteration.begin(q, u, W + (s - 1) * n);
+            else
+                fixed_point.iteration.begin(q, W + (s - 1) * n);
+        }
         return status;
     }
 
@@ -214,15 +217,6 @@ protected:
     }
 
 private:
-    template <class AnyFixedPoint>
-    void begin_fixed_point(AnyFixedPoint& any) {
-        any.pause = Pause();
-        if constexpr (along_coordinates)
-            any.iteration.begin(q, u, W + (s - 1) * n);
-        else
-            any.iteration.begin(q, W + (s - 1) * n);
-    }
-
     // A step by iterations; where they fail, all is made ready for Newton's iteration.
     template <class AnyFixedPoint>
     bool iterate(AnyFixedPoint& any) {
@@ -290,8 +284,7 @@ private:
         stages.arrive(a.base, a.W, a.q1);
         Formulas<K>::minus_acceleration(coefficients, this->next_time(), a.q1, a.W1);
         stages.finish(a.v, a.W, a.W1, a.u1);
-        real sum = real(0);
-        for (int k = 0; k < n; ++k) sum += (a.q1[k] - a.q1[k]) + (a.u1[k] - a.u1[k]) + (a.W1[k] - a.W1[k]);
+        const real sum = not_finite_part(a.q1, n) + not_finite_part(a.u1, n) + not_finite_part(a.W1, n);
         if (!(sum == real(0))) return Status::not_finite;
         for (int k = 0; k < n; ++k) {
             q_before[k] = q[k];
@@ -311,6 +304,11 @@ private:
         const auto outcome = newton.solve(coefficients, step_size, this->time(), q, W0, a);
         iterations = outcome.iterations;
         increment = outcome.increment;
+        if constexpr (has_fixed_point)
+            if (real(2) * outcome.noise > fixed_point.iteration.least_increment) {
+                fixed_point.iteration.least_increment = real(2) * outcome.noise;
+                fixed_point.pause = {1, 1};  // iterations that only failed for what rounds take the next step again
+            }
         return outcome.status;
     }
 };

@@ -22,7 +22,7 @@ public:
     using S = WatchedStepper<K>;
     static constexpr int n = K::coordinates, columns = Events<K>::columns;
     static constexpr int walls = S::walls, first_wall = K::events - walls, stops = stops_of<K>();
-    static constexpr bool goes_back = !is_clocked<K>();
+    static constexpr bool goes_back = !is_clocked<K>;
     static constexpr int most_impacts = walls > 0 ? 100 : 0;                             // in one step
     static constexpr int most = Events<K>::most + most_impacts * (1 + Events<K>::most);  // rows of one step
 

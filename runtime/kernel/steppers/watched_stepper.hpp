@@ -21,7 +21,7 @@ struct Between {
     static constexpr int n = K::coordinates, columns = 1 + 2 * n;
 
     static real time(const S& stepper, real theta) {
-        if constexpr (is_clocked<K>())
+        if constexpr (is_clocked<K>)
             return stepper.time_within(theta);
         else
             return stepper.start_time + (real(stepper.steps - 1) + theta) * stepper.step_size;
