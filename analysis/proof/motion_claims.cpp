@@ -127,7 +127,7 @@ void excuse_rest(std::vector<ProofRow>& rows, std::size_t of_motion, const Syste
         for (const std::vector<double>* const part : {&q, &p})
             along.back().insert(along.back().end(), part->begin(), part->end());
     }
-    if (!rests_on_constraints(system, along, start.parameters, 0x1p-52)) return;
+    if (!is_at_rest(system, along, start.parameters, 0x1p-52)) return;
     for (std::size_t i = of_motion; i < rows.size(); ++i)
         if (!rows[i].holds) rows[i] = not_decided(rows[i].claim, "the motion rests, but for rounding");
 }

@@ -230,3 +230,32 @@ TEST_CASE("tune measures a mechanism at rest by the size of what holds it" * doc
         test::run({LOBATTO_PROGRAM, "tune", scene.folder / "scene.toml", "--error", "1e-6", "--budget", "600"});
     CHECK_MESSAGE(tuned.exit_code == 0, tuned.err);
 }
+
+TEST_CASE("an equilibrium is no motion that is lost, wherever it is") {
+    const std::string rest = "[run]\nstep = 0.02\nuntil = 20\n";
+    const char* equilibria[] = {
+        "lagrangian = \"(x'^2 + y'^2)/2 - (y - x - 1)^2/2\"\n[coordinates]\nx = { position = 0, velocity = 0 }\n"
+        "y = { position = 1, velocity = 0 }\n",
+        // A circular orbit in the frame that turns with it; the same orbit's neighbourhood, where rounding moves x.
+        "lagrangian = \"((x' - y)^2 + (y' + x)^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
+        "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 0 }\n",
+        "lagrangian = \"(x'^2 + y'^2)/2 + x*y' - y*x' + 3*x^2/2\"\n[coordinates]\n"
+        "x = { position = 0, velocity = 0 }\ny = { position = 1, velocity = 0 }\n"};
+    for (const std::string scene : equilibria) {
+        CAPTURE(scene);
+        const test::MeasuredScene at_rest(scene + rest);
+        for (const char* until : {"20", "200"}) {
+            const test::Finished finished = at_rest.run({"--until", until});
+            CHECK_MESSAGE(finished.exit_code == 0, finished.err);
+            CHECK(finished.err == "");
+        }
+        const test::Finished swept = test::run({LOBATTO_PROGRAM, "sweep", at_rest.folder / "scene.toml", "--vary",
+                                                "y=0,1", "-o", at_rest.folder / "sweep.csv"});
+        CHECK_MESSAGE(swept.exit_code == 0, swept.err);
+    }
+    // One that is left because it is unstable is told: y is beside 1 by less than any double can say.
+    const test::MeasuredScene unstable(
+        "lagrangian = \"(x'^2 + y'^2)/2 + (y - x - 1)^2/2\"\n[coordinates]\nx = { position = 0, velocity = 0 }\n"
+        "y = { position = 1, velocity = 0 }\n" + rest);
+    CHECK(unstable.run({"--until", "100"}).exit_code == 3);
+}

@@ -167,3 +167,20 @@ TEST_CASE("in sweeps such a trajectory is measured by a companion of its own") {
         }
     }
 }
+
+TEST_CASE("an impact that follows soon after the end of a run is no part of it") {
+    // Rods of one mass hand their velocities on: the motion is exact, whatever the steps.
+    const test::MeasuredScene rods(
+        "lagrangian = \"sum(i=1..n, x[i]'^2/2)\"\n[coordinates]\n"
+        "x = { count = \"n\", position = \"i - 0.5 + 0.2*sin(5*i)\", velocity = \"2*sin(3*i*i)\" }\n"
+        "[parameters]\nn = { value = 11, constant = true }\n[impacts]\n"
+        "\"hit[i]\" = { when = \"x[i+1] - x[i] = 0 falling\", count = \"n-1\" }\n"
+        "lo = { when = \"x[1] = 0 falling\" }\nhi = { when = \"x[n] = n rising\" }\n"
+        "[method]\npoints = 2\n[run]\nstep = 0.1\nuntil = 5\n");
+    for (const char* until : {"5", "13", "17"}) {
+        INFO(until);
+        const test::Finished finished = rods.run({"--until", until});
+        CHECK_MESSAGE(finished.exit_code == 0, finished.err);
+        CHECK(absolute_error(finished.out) < 1e-12);
+    }
+}

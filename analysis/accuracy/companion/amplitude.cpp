@@ -10,8 +10,6 @@ namespace lobatto {
 
 namespace {
 
-// Of the place, by which what rests moves: the roundings of the forces there add to its own.
-constexpr double few_roundings = 128;
 constexpr double displaced = 0.01;  // of its amplitude, at the start: what moves, not what rounding moves
 // Of the largest place of all: what is left of rounding where a constraint holds a coordinate at 0. Newton's iteration
 // squares it each time; a motion that small beside others is none.

@@ -11,6 +11,9 @@
 
 namespace lobatto {
 
+// Of the place, by which what rests moves: the roundings of the forces there add to its own.
+constexpr double few_roundings = 128;
+
 constexpr double by_chance = 0.1;  // of an amplitude: what is apart by more may meet again, and is no small error then
 constexpr double out_of_step = 0.5;  // of an amplitude: two motions of which each knows nothing of the other
 constexpr double noise = 1e-10;      // of what moves a number: where that cancels, rounding leaves less

@@ -2,21 +2,43 @@
 #include "analysis/accuracy/companion/at_rest.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "analysis/accuracy/companion/amplitude.hpp"
 #include "analysis/accuracy/formulas/constraint_sizes.hpp"
 
 namespace lobatto {
 
-bool rests_on_constraints(const SystemOutline& system, const std::vector<std::vector<double>>& rows,
-                          const std::vector<double>& parameters, double epsilon) {
-    if (system.constraints.empty() || rows.empty()) return false;
-    const ConstraintSizes constraints(system);
+namespace {
+
+constexpr double nearby = 1e-6;  // of the place: an equilibrium that is unstable is left by more
+
+}  // namespace
+
+bool stays_within(double part, const double* start, const std::vector<double>& least, const std::vector<double>& most) {
+    const std::size_t n = least.size() / 2;
+    double farthest = 0;
+    for (std::size_t k = 0; k < n; ++k) farthest = std::fmax(farthest, std::fabs(start[k]));
+    for (std::size_t k = 0; k < n; ++k)
+        if (!(most[k] - least[k] <= part * (start[k] != 0 ? std::fabs(start[k]) : farthest))) return false;
+    return true;
+}
+
+bool rests_beside_companion(const double* start, const std::vector<double>& least, const std::vector<double>& most,
+                            const std::vector<double>& least_of_companion, const std::vector<double>& most_of_companion,
+                            double epsilon) {
+    return stays_within(few_roundings * epsilon, start, least, most) &&
+           stays_within(nearby, start, least_of_companion, most_of_companion);
+}
+
+bool is_at_rest(const SystemOutline& system, const std::vector<std::vector<double>>& rows,
+                const std::vector<double>& parameters, double epsilon) {
+    if (rows.empty()) return false;
     std::vector<double> least, most, sizes;
-    for (const std::vector<double>& row : rows) {
-        widen_to(least, most, row.data() + 1, row.size() - 1);
-        constraints.widen(sizes, row[0], row.data() + 1, parameters);
-    }
+    for (const std::vector<double>& row : rows) widen_to(least, most, row.data() + 1, row.size() - 1);
+    if (system.constraints.empty()) return stays_within(few_roundings * epsilon, rows.front().data() + 1, least, most);
+    const ConstraintSizes constraints(system);
+    for (const std::vector<double>& row : rows) constraints.widen(sizes, row[0], row.data() + 1, parameters);
     const std::vector<bool> moves = moving(least, most, places_of(least, most, sizes), rounding_of_run(epsilon));
     return std::none_of(moves.begin(), moves.begin() + std::ssize(moves) / 2, [](bool any) { return any; });
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/accuracy/companion/amplitude.hpp"
+#include "analysis/accuracy/companion/at_rest.hpp"
 #include "analysis/accuracy/companion/companion.hpp"
 #include "analysis/accuracy/companion/distance.hpp"
 #include "runtime/run/parts.hpp"
@@ -103,6 +104,9 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
                 widen_to(all.least, all.most, row.data(), row.size());
                 widen_to(of_companion.least, of_companion.most, row.data(), row.size());
             }
+    if (comparisons > 0 && rests_beside_companion(request_.q.data(), range_.least, range_.most, of_companion.least,
+                                                  of_companion.most, run_epsilon_))
+        return std::vector<double>(2 * n, 0.0);
     std::vector<double> by_constraints;
     constraints_.widen(by_constraints, request_.time, request_.q.data(), parameters_);
     for (std::size_t j = 0; j < comparisons && !constraints_.empty(); ++j)

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "analysis/accuracy/companion/amplitude.hpp"
+#include "analysis/accuracy/companion/at_rest.hpp"
 #include "analysis/accuracy/companion/companion.hpp"
 #include "analysis/accuracy/companion/distance.hpp"
 #include "analysis/accuracy/companion/errors_of_steps.hpp"
@@ -216,11 +217,15 @@ std::vector<double> EnsembleCompanion::amplitudes(
     std::vector<double> least, most, of_companion[2];
     for (std::int64_t i = 0; i < kept.count; ++i) widen_to(least, most, kept.rows + i * kept.columns + 1, 2 * n);
     const std::vector<double> run_half = half_of(least, most);
-    for (std::int64_t i = 0; i < 2 * comparisons; ++i) {
-        const double* const row = known.ranges.data() + i * static_cast<std::int64_t>(2 * n);
-        widen_to(least, most, row, 2 * n);
-        widen_to(of_companion[0], of_companion[1], row, 2 * n);
-    }
+    const auto range_of_companion = [&](std::int64_t i) {
+        return known.ranges.data() + i * static_cast<std::int64_t>(2 * n);
+    };
+    for (std::int64_t i = 0; i < 2 * comparisons; ++i)
+        widen_to(of_companion[0], of_companion[1], range_of_companion(i), 2 * n);
+    if (comparisons > 0 &&
+        rests_beside_companion(kept.rows + 1, least, most, of_companion[0], of_companion[1], kernel_->epsilon))
+        return std::vector<double>(2 * n, 0.0);
+    for (std::int64_t i = 0; i < 2 * comparisons; ++i) widen_to(least, most, range_of_companion(i), 2 * n);
     std::vector<double> by_constraints;
     for (std::int64_t i = 0; i < kept.count && !constraints_.empty(); ++i) {
         const double* const row = kept.rows + i * kept.columns;

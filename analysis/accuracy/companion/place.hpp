@@ -25,15 +25,17 @@ struct CompanionPlace {
     struct State {
         std::vector<double> time, step, q, p;
         std::string memory;  // of the stepper: a start may be refused where the motion goes on, as on a wall
+        NearCuts cuts;
     };
     State before = {};  // the last step that was taken by itself
-    State state() const { return {time, step, q, p, stepper.memory()}; }
+    State state() const { return {time, step, q, p, stepper.memory(), cuts}; }
     void go_back(const State& to) {
         time = to.time;
         step = to.step;
         q = to.q;
         p = to.p;
         stepper.restore(to.memory);
+        cuts = to.cuts;
         status = LOBATTO_OK;
     }
 

@@ -57,10 +57,10 @@ std::optional<Pulse> ShortContacts::found(CompanionPlace& place, const std::vect
         else
             place.advance(1, request_.tolerance);
     }
+    const double gap = place.cuts.gap(), middle = place.cuts.middle();
     place.go_back(after);
-    const double gap = place.cuts.gap();
     if (!(gap < longest && gap < undivided * size)) return std::nullopt;
-    return Pulse{place.cuts.middle(), gap};
+    return Pulse{middle, gap};
 }
 
 // Whether parts of a contact lead elsewhere by much more than halves of steps do that nothing cuts. Where they do not,

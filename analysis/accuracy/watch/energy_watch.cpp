@@ -182,7 +182,7 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
                                    const TrajectoryRequest& request) const {
     LoadedStepper<double> stepper(kernel);
     if (leaving_.size() < 2 || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
-        rests_on_constraints(outline.system, rows_of_some(), request.parameters, kernel->epsilon))
+        is_at_rest(outline.system, rows_of_some(), request.parameters, kernel->epsilon))
         return "";
     ExactEnergy energy(outline, request.parameters);
     const auto energy_of = [&](const State& state) {
