@@ -55,7 +55,7 @@ private:
 
 double force_rounding(const Outline& outline, const LoadedStepper<double>& stepper,
                       const std::vector<double>& parameters, const std::vector<std::vector<double>>& rows,
-                      const std::vector<bool>& moves) {
+                      const std::vector<bool>& moves, const std::vector<int>& groups) {
     const std::size_t n = outline.system.q.size();
     if (n > most_looked_at || rows.empty()) return 0;
     ExactForce exact(outline, parameters);
@@ -88,7 +88,9 @@ double force_rounding(const Outline& outline, const LoadedStepper<double>& stepp
         }
         if (errors[k] * latest <= 0x1p-53 * momentum) continue;
         for (const std::vector<cln::cl_R>& force : forces)
-            largest = std::fmax(largest, std::fabs(cln::double_approx(force[k])));
+            for (std::size_t other = 0; other < n; ++other)
+                if (groups[other] == groups[k])
+                    largest = std::fmax(largest, std::fabs(cln::double_approx(force[other])));
         if (largest > 0) worst = std::fmax(worst, errors[k] / largest);
     }
     return worst;

@@ -153,7 +153,7 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
                     most_[k] - least_[k] > kernel->epsilon * static_cast<double>(result.steps_done) *
                                                std::fmax(std::fabs(most_[k]), std::fabs(least_[k]));
     if (outline.scene.constraints.empty())
-        judgement.rounding = force_rounding(outline, stepper, request.parameters, rows, swings);
+        judgement.rounding = force_rounding(outline, stepper, request.parameters, rows, swings, groups_);
     return judgement;
 }
 

@@ -272,8 +272,7 @@ const TrajectoryResult& go_into(Files& files, api::OpenedRun& run, const std::st
         listeners.checkpoint = [&](const Halfway& halfway) { files.checkpoint(identity, halfway, run.observers()); };
     Progress progress(run.request().steps);
     if (!quiet) listeners.progress = [&](std::int64_t done) { progress.show(done); };
-    const Interruption interruption;
-    listeners.interrupted = interruption.flag();
+    listeners.interrupted = Interruption::flag();
     const TrajectoryResult& result = run.go(listeners);
     files.finish(result.interrupted);
     return result;
@@ -297,6 +296,10 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryResult& result, co
     if (result.interrupted) {
         tell("lobatto: interrupted at t = {:.6g}; what was computed is in {}.{}\n", result.time, files.path(),
              files.keeps_checkpoints() ? " The same command with --resume continues from there." : "");
+        throw ExitCode{interrupted_exit};
+    }
+    if (*Interruption::flag() != 0) {
+        tell("lobatto: interrupted while the error was measured; the whole run is in {}\n", files.path());
         throw ExitCode{interrupted_exit};
     }
 }
@@ -349,6 +352,7 @@ void run(const RunOptions& options) {
                                       : "nothing was left: from the start");
     }
     Files files(options, run, header, from);
+    const Interruption interruption;
     const TrajectoryResult& result = go_into(files, opened, identity, quiet);
     if (!quiet && !options.companion.empty()) say("measuring the error in " + options.companion);
     const RunVerdict verdict = opened.verdict();

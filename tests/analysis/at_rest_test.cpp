@@ -256,6 +256,7 @@ TEST_CASE("an equilibrium is no motion that is lost, wherever it is") {
     // One that is left because it is unstable is told: y is beside 1 by less than any double can say.
     const test::MeasuredScene unstable(
         "lagrangian = \"(x'^2 + y'^2)/2 + (y - x - 1)^2/2\"\n[coordinates]\nx = { position = 0, velocity = 0 }\n"
-        "y = { position = 1, velocity = 0 }\n" + rest);
+        "y = { position = 1, velocity = 0 }\n" +
+        rest);
     CHECK(unstable.run({"--until", "100"}).exit_code == 3);
 }

@@ -14,6 +14,7 @@
 #include "generator/pipeline.hpp"
 #include "generator/programs/programs.hpp"
 #include "runtime/run/trajectory.hpp"
+#include "tests/analysis/measured_scene.hpp"
 #include "tests/support.hpp"
 
 using namespace lobatto;
@@ -233,4 +234,16 @@ TEST_CASE("a step across a knot errs by h^4 where a force is the table, and step
     CHECK(std::fabs(exact - error_with(0.1, 40)) < 1e-14);
     CHECK(std::fabs(coarse) > 1e-6);
     CHECK(std::fabs(fine) < std::fabs(coarse));
+}
+
+TEST_CASE("a fast top near its pole keeps its digits without its cyclic coordinates") {
+    const test::MeasuredScene top(
+        "lagrangian = \"A*(th'^2 + ph'^2*sin(th)^2)/2 + C*(ps' + ph'*cos(th))^2/2 - 9.81*cos(th)\"\n[coordinates]\n"
+        "th = { position = 0.003, velocity = 0 }\nph = { position = 0, velocity = 0 }\n"
+        "ps = { position = 0, velocity = 30 }\n[parameters]\nA = 1\nC = 0.5\n[run]\nstep = 0.005\nuntil = 1\n");
+    const test::Finished reduced = top.run();
+    CHECK_MESSAGE(reduced.exit_code == 0, reduced.err);
+    const std::vector<double> end = top.end();
+    CHECK(top.run({"--general", "--numbers", "quadruple", "--step", "0.001"}).exit_code == 0);
+    CHECK(std::abs(end[1] - top.end()[1]) < 1e-13);
 }

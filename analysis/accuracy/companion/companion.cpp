@@ -418,7 +418,8 @@ bool Companion::has_compared() const {
     return !companion_.empty();
 }
 
-std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
+std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result, const volatile int* interrupted) {
+    const auto goes_on = [&] { return interrupted == nullptr || *interrupted == 0; };
     const bool has_end =
         result.status == LOBATTO_OK && !result.interrupted && (result.steps_done > 0 || result.stop >= 0);
     if (has_end) {
@@ -429,13 +430,13 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result) {
                                : begins_now                            ? result.seconds / 2
                                                                        : 0,
                      to_first = 4 * result.seconds;  // where few states are kept
-        while (!finished_ && !has_caught_up() &&
+        while (goes_on() && !finished_ && !has_caught_up() &&
                watch.seconds() < (has_compared() ? longest : std::fmax(longest, to_first)))
             std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
     cancelled_ = true;
     if (thread_.joinable()) thread_.join();
-    if (has_end && result.stop >= 0)
+    if (has_end && result.stop >= 0 && goes_on())
         compare_at_stop(is_finer_ || result.seconds < short_run ? std::numeric_limits<double>::infinity()
                                                                 : result.seconds / 2);
     if (!has_end || run_.empty() || (companion_.empty() && !stopped_)) return std::nullopt;

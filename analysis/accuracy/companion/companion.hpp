@@ -73,8 +73,8 @@ public:
     // Where a stop ended the run, the companion is compared there too.
     // Waits for the companion, where it computes in finer numbers or the run took less than a second of processor time,
     // and compares what there is; else that is as much as was computed beside the run. Nothing: the run was stopped, or
-    // took no step.
-    std::optional<MeasuredError> finish(const TrajectoryResult& result);
+    // took no step. interrupted: not 0 once it shall wait no longer.
+    std::optional<MeasuredError> finish(const TrajectoryResult& result, const volatile int* interrupted = nullptr);
 
 private:
     struct Point {

@@ -143,6 +143,46 @@ void add_constraints(const System& system, Routhian& routhian) {
     routhian.second = second;
 }
 
+int parts_of(const ex& formula) {
+    int parts = 1;
+    for (const ex& part : formula) parts += parts_of(part);
+    return parts;
+}
+
+struct SumOfSquares {
+    std::vector<ex> squares, solution;  // r . A^-1 r is the sum of these; A^-1 r
+};
+
+// Of a definite matrix, by elimination, the simplest pivot first: (P - Q cos(a))^2 / sin(a)^2 keeps its digits where
+// the inverse of the matrix, multiplied out, is a difference of large numbers.
+SumOfSquares sum_of_squares(GiNaC::matrix A, std::vector<ex> r) {
+    const unsigned c = A.rows();
+    std::vector<unsigned> order;
+    std::vector<bool> done(c, false);
+    SumOfSquares found{std::vector<ex>(c), std::vector<ex>(c)};
+    for (unsigned step = 0; step < c; ++step) {
+        unsigned k = c;
+        for (unsigned i = 0; i < c; ++i)
+            if (!done[i] && (k == c || parts_of(A(i, i)) < parts_of(A(k, k)))) k = i;
+        done[k] = true;
+        order.push_back(k);
+        found.squares[k] = GiNaC::pow(r[k], 2) / A(k, k);
+        for (unsigned i = 0; i < c; ++i) {
+            if (done[i]) continue;
+            const ex part = A(i, k) / A(k, k);
+            r[i] -= part * r[k];
+            for (unsigned j = 0; j < c; ++j)
+                if (!done[j]) A(i, j) -= part * A(k, j);
+        }
+    }
+    for (auto k = order.rbegin(); k != order.rend(); ++k) {
+        ex rest = r[*k];
+        for (auto later = order.rbegin(); later != k; ++later) rest -= A(*k, *later) * found.solution[*later];
+        found.solution[*k] = rest / A(*k, *k);
+    }
+    return found;
+}
+
 }  // namespace
 
 Routhian reduce(const System& system, const std::vector<int>& cyclic) {
@@ -154,18 +194,19 @@ Routhian reduce(const System& system, const std::vector<int>& cyclic) {
     std::vector<ex> terms = system.terms;
     if (!cyclic.empty()) {
         const unsigned c = static_cast<unsigned>(cyclic.size());
-        GiNaC::matrix inertia(c, c), rest(c, 1);
+        GiNaC::matrix inertia(c, c);
+        std::vector<ex> rest;
         const auto index = [&](unsigned i) { return static_cast<std::size_t>(cyclic[i]); };
         for (unsigned i = 0; i < c; ++i) {
-            rest(i, 0) = routhian.P[i] - at_rest(system.momentum[index(i)], system, cyclic);
+            rest.push_back(routhian.P[i] - at_rest(system.momentum[index(i)], system, cyclic));
             for (unsigned j = 0; j < c; ++j)
                 inertia(i, j) = at_origin(system.momentum_v(index(i), index(j)), system, cyclic);
         }
-        const GiNaC::matrix velocity = inertia.inverse().mul(rest);
         for (ex& term : terms) term = at_rest(term, system, cyclic);
+        const SumOfSquares found = sum_of_squares(inertia, rest);
         for (unsigned i = 0; i < c; ++i) {
-            terms.push_back(-rest(i, 0) * velocity(i, 0) / 2);
-            velocities[system.v[index(i)]] = velocity(i, 0);
+            terms.push_back(-found.squares[i] / 2);
+            velocities[system.v[index(i)]] = found.solution[i];
         }
     }
     std::vector<GiNaC::symbol> v, q;
