@@ -16,12 +16,6 @@ namespace {
 
 using GiNaC::ex;
 
-bool holds_any(const SparseMatrix& matrix, const std::vector<GiNaC::symbol>& symbols) {
-    return std::any_of(matrix.entries().begin(), matrix.entries().end(), [&](const auto& entry) {
-        return std::any_of(symbols.begin(), symbols.end(), [&](const auto& s) { return entry.second.has(s); });
-    });
-}
-
 bool has_linear_terms(const System& system) {
     GiNaC::exmap at_rest;
     for (const auto& velocity : system.v) at_rest[velocity] = 0;
@@ -63,16 +57,16 @@ std::string kind_of(const Derivation& derivation) {
     const bool has_time = derivation.scene.has_time_coordinate(), linear_terms = !has_time && has_linear_terms(system);
     if (has_time)
         text = "In the time of the clock, where the physical time is a coordinate because the energy changes";
-    else if (holds_any(system.momentum_v, system.v))
+    else if (system.momentum_v.holds_any(system.v))
         text = "Not quadratic in the velocities, as in relativity";
-    else if (holds_any(system.momentum_v, system.q))
+    else if (system.momentum_v.holds_any(system.q))
         text = "Quadratic in the velocities, with masses that depend on the position";
-    else if (holds_any(system.momentum_v, {system.t}))
+    else if (system.momentum_v.holds_any({system.t}))
         text = "Quadratic in the velocities, with masses that depend on the time";
     else
         text = linear_terms ? "Quadratic in the velocities, with constant masses"
                             : "Kinetic minus potential energy, with constant masses";
-    if (linear_terms && !holds_any(system.momentum_v, system.v))
+    if (linear_terms && !system.momentum_v.holds_any(system.v))
         text += ", and with terms linear in the velocities, as in magnetic fields and rotating frames";
     if (derivation.scene.clock && !has_time) text += ", in the clock's time";
     if (!system.autonomous) text += "; t appears explicitly";

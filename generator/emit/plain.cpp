@@ -113,13 +113,19 @@ static inline bool solve(int size, real* A, real* y) {
     return true;
 }
 
-// The velocity that belongs to p: Newton's iteration for dL/dv(q, v) = p, from the velocity given (D27).
+// The velocity that belongs to p: Newton's iteration for dL/dv(q, v) = p, from the velocity given (D27). An increment
+// to where momenta have no value, as beyond the speed of light, is halved.
 static inline bool velocity(const Parameters& parameters, real t, const real* q, const real* p, real* v) {
-    real change = std::numeric_limits<real>::infinity();
+    real change = std::numeric_limits<real>::infinity(), d[n] = {};
     for (int iteration = 0; iteration < 100; ++iteration) {
-        real z[Z], g[Z], H[Z * Z], M[n * n], d[n];
+        real z[Z], g[Z], H[Z * Z], M[n * n], sum = 0;
         for (int k = 0; k < n; ++k) z[k] = v[k], z[n + k] = q[k];
         node(parameters, t, z, g, H);
+        for (int k = 0; k < n; ++k) sum += g[k];
+        if (iteration > 0 && !std::isfinite(sum)) {
+            for (int k = 0; k < n; ++k) d[k] /= 2, v[k] -= d[k];
+            continue;
+        }
         for (int k = 0; k < n; ++k) {
             d[k] = p[k] - g[k];
             for (int l = 0; l < n; ++l) M[k * n + l] = H[k * Z + l];

@@ -102,6 +102,8 @@ std::string general_shapes(const Derivation& d) {
     text += has_full_matrix(d) ? full_places("entry", 2 * d.system.n) : places("entry", entries);
     line(text, fmt::format("int mass_entries = {}", mass.size()), "of M = d2L/dvdv that are not identically zero");
     text += places("mass", mass);
+    if (d.system.momentum_v.holds_any(d.system.v) && d.system.constraints.empty() && !d.scene.clock)
+        line(text, "bool mass_needs_velocity = true", "M changes with velocities");
     line(text, fmt::format("bool constant_mass = {}", d.system.constant_mass),
          d.system.constant_mass ? "and forces without velocities" : "or forces hold velocities");
     const bool scaled = uses_scaled_mass(d.scene, d.system, d.structure);

@@ -4,8 +4,10 @@
 
 #include <ginac/ginac.h>
 
+#include <algorithm>
 #include <map>
 #include <utility>
+#include <vector>
 
 namespace lobatto {
 
@@ -24,6 +26,11 @@ public:
     void put(int row, int column, const GiNaC::ex& value) { entries_[{row, column}] = value; }
     // Row by row; none is identically zero.
     const std::map<std::pair<int, int>, GiNaC::ex>& entries() const { return entries_; }
+    bool holds_any(const std::vector<GiNaC::symbol>& symbols) const {
+        return std::any_of(entries_.begin(), entries_.end(), [&](const auto& entry) {
+            return std::any_of(symbols.begin(), symbols.end(), [&](const auto& s) { return entry.second.has(s); });
+        });
+    }
     GiNaC::matrix dense() const {
         GiNaC::matrix result(static_cast<unsigned>(rows_), static_cast<unsigned>(columns_));
         for (const auto& [place, value] : entries_)

@@ -23,6 +23,12 @@ struct MomentaCancel : std::false_type {};
 template <class K>
 struct MomentaCancel<K, std::void_t<decltype(K::momentum_summand_count)>> : std::true_type {};
 
+// Whether masses change with velocities, as those of relativity do, and no constraint holds these.
+template <class K, class = void>
+struct MassNeedsVelocity : std::false_type {};
+template <class K>
+struct MassNeedsVelocity<K, std::void_t<decltype(K::mass_needs_velocity)>> : std::true_type {};
+
 template <class K>
 class VelocityOfMomentum {
 public:

@@ -147,7 +147,14 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinConstraints<K> {
         if constexpr (K::has_energy) {
             real v[n];
             const Status status = velocity(time, position, momentum, v);
-            if (status == Status::ok) *value = Formulas<K>::energy(coefficients, time, position, v);
+            if (status != Status::ok) return status;
+            *value = Formulas<K>::energy(coefficients, time, position, v);
+            if constexpr (MassNeedsVelocity<K>::value) {
+                // H errs by dH/dv = M v times the error of v, and by its square with the momentum that is known (D26).
+                real Lv[n], Lq[n];
+                slopes(time, position, v, Lv, Lq);
+                for (int k = 0; k < n; ++k) *value += (momentum[k] - Lv[k]) * v[k];
+            }
             return status;
         } else {
             return Status::unsupported;

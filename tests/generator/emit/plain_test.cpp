@@ -163,6 +163,18 @@ TEST_CASE("a step that cannot be solved is refused, and the state stays") {
     CHECK(test::run({folder / "main"}).out == "0 1\n");
 }
 
+TEST_CASE("the plain text begins with the momentum of a particle near the speed of light") {
+    for (const char* momentum : {"0.5", "1", "5", "50"}) {
+        CAPTURE(momentum);
+        const Scene scene =
+            test::scene_of("-sqrt(1 - x'^2) + x", fmt::format("x = {{ position = 0, momentum = {} }}", momentum), 4);
+        const double p = std::strtod(momentum, nullptr);
+        const std::vector<double> end = plain_end(scene, 0.01, 100, "g++");
+        CHECK(std::abs(end[1] - (std::hypot(1, p + 1) - std::hypot(1, p))) < 1e-12);
+        CHECK(std::abs(end[2] - (p + 1)) < 1e-12);
+    }
+}
+
 TEST_CASE("scenes that have no plain text are told why") {
     const auto message = [](Scene scene, Precision precision = Precision::double_) {
         return test::message_of<InputError>([&] { emit_plain(scene, precision); });
