@@ -141,6 +141,28 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, s
 
 namespace {
 
+bool has_sine_of(const GiNaC::ex& formula, const GiNaC::symbol& x) {
+    if (GiNaC::is_a<GiNaC::function>(formula) && formula.has(x)) {
+        const std::string name = GiNaC::ex_to<GiNaC::function>(formula).get_name();
+        if (name == "sin" || name == "cos" || name == "tan") return true;
+    }
+    return std::any_of(formula.begin(), formula.end(), [&](const GiNaC::ex& part) { return has_sine_of(part, x); });
+}
+
+// A unit is a word, and converts nothing.
+std::vector<std::string> degrees_in_sines(const Scene& scene) {
+    std::vector<std::string> texts;
+    for (const Coordinate& coordinate : scene.coordinates) {
+        const bool is_degrees = coordinate.unit.starts_with("deg") || coordinate.unit == "\u00b0";
+        if (is_degrees && has_sine_of(scene.lagrangian, coordinate.position))
+            texts.push_back(
+                fmt::format("{0} has the unit {1}, but its sine and cosine take it for radians: units convert "
+                            "nothing. Write position = \"30*pi/180\" and unit = \"rad\"",
+                            coordinate.written, coordinate.unit));
+    }
+    return texts;
+}
+
 // What a companion in the run's own numbers says, or a finer one, which sees all rounding; 0: nothing.
 double known_error(const PreparedRun& run, const std::optional<MeasuredError>& error) {
     if (run.finer || run.scene.method.numbers != Precision::double_ || !run.scene.constraints.empty())
@@ -183,6 +205,7 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
                  observers.judge.judge(run.outline, run.plain, request, result), known_error(run, verdict.error)))
             verdict.warnings.push_back(warning);
     for (const std::string& jump : jumps_of(scene, request.parameters)) verdict.warnings.push_back(jump);
+    for (const std::string& text : degrees_in_sines(scene)) verdict.warnings.push_back(text);
     verdict.failure = failure_of(run, request, result, observers, departure);
     return verdict;
 }

@@ -83,6 +83,9 @@ void prove_momenta(std::vector<ProofRow>& rows, const Kernel& kernel, const Star
         found.push_back(at_most(symmetry.kind + ": " + momentum, variation, bound, meaning));
     }
     if (found.empty()) rows.push_back({"momenta of linear symmetries", "none found", "", true, ""});
+    if (std::ssize(names) > most_turned)
+        rows.push_back(not_decided("momenta of rotations",
+                                   fmt::format("they are looked for among up to {} coordinates", most_turned)));
     constexpr std::size_t most_rows = 6;
     if (found.size() > most_rows)
         found = {at_most(fmt::format("momenta of {} linear symmetries", found.size()), worst, bound, meaning)};

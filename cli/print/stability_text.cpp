@@ -85,7 +85,7 @@ std::string proof_text(const ProofOfStability& proof) {
 std::string mode_text(const Stability& member, const Mode& mode) {
     if (mode.squared_frequency == 0)
         return fmt::format("  omega = 0              {}",
-                           mode.free ? "free: moves on steadily" : "the linear part says nothing here");
+                           mode.free ? "free: nothing pulls back" : "the linear part says nothing here");
     const double x = std::sqrt(std::fabs(mode.z));
     if (mode.squared_frequency < 0)
         return fmt::format("  omega^2 = {:<12.6g} unstable motion: grows by {:.5g} in a time h, per step by {}",

@@ -178,6 +178,19 @@ void Parser::refuse_by_role(const Syntax& formula, std::string_view base) const 
         if (std::find(declared.begin(), declared.end(), of + "'") != declared.end())
             advice = fmt::format(" The velocity of {0} is written {0}'.", of);
     }
+    const auto is_declared = [&](const std::string& written) {
+        return std::find(declared.begin(), declared.end(), written) != declared.end();
+    };
+    if (scope_.motion_allowed && name.ends_with("'"))
+        advice = fmt::format(
+            " A coordinate {0} needs a line {0} = {{ position = ..., velocity = ... }} under "
+            "[coordinates].",
+            name.substr(0, name.find('\'')));
+    if (name == "e" && token().is('^')) advice = " Write exp(...).";
+    if (scope_.motion_allowed && advice.empty() && (name == "v" || name == "qdot"))
+        for (const std::string& written : declared)
+            if (advice.empty() && is_declared(written + "'"))
+                advice = fmt::format(" The velocity of {0} is written {0}'.", written);
     fail(at, fmt::format("unknown name '{}' in {}; declared: {}.{}", shown, scope_.formula, listing(declared), advice));
 }
 

@@ -141,7 +141,9 @@ public:
             good = skip_digits() > 0 && next_ - first <= 3;
             if (good) exponent = std::stoi(std::string(text_.substr(from, next_ - from)));
         }
-        if (!good) fail(begin, fmt::format("{} is missing: a line has two numbers, such as 0.5, 1.25", what));
+        if (!good)
+            fail(begin,
+                 fmt::format("{} is missing, or no finite number such as 1.25 or 1e-3: a line has two of them", what));
         return value(text_.substr(begin, next_ - begin), exponent, begin);
     }
     void separator() {

@@ -89,8 +89,9 @@ SystemReader::ArrayName SystemReader::declare_array(const Entry& entry, const st
     declarations_.declare(name, subject.name.at, what);
     if (!subject.subscripted) return {name, std::nullopt};
     if (subject.indices.size() != 1)
-        fail(subject.subscript.at.at,
-             fmt::format("an array of {}s has one index without another meaning: write \"{}[i]\"", what, name));
+        fail(entry.at, fmt::format("an array of {0}s has one index without another meaning: write \"{1}[i]\", and for "
+                                   "pairs one line for each distance, as \"{1}_1[i]\"",
+                                   what, name));
     return {name, std::string(subject.indices.front().text)};
 }
 

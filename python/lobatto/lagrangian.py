@@ -79,6 +79,11 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
     if missing:
         raise InputError(f"'{missing[0]}' stands in the Lagrangian as {missing[0]}', so it is a coordinate; give its "
                          f"start: Lagrangian(..., {missing[0]}=(position, velocity))")
+    if not coordinates:
+        raise InputError("no velocity stands in the Lagrangian: the velocity of x is written x', as in m*x'^2/2")
+    stands = r"(?<![A-Za-z0-9_])t(?![A-Za-z0-9_'\[]|\s*=[^=])"
+    if not time and "t" not in {*variables, *(definitions or {})} and any(re.search(stands, f) for f in formulas):
+        raise InputError("t stands in a formula: if it is the time, say Lagrangian(..., time=\"t\")")
     coordinates = {name: _coordinate(name, value) for name, value in coordinates.items()}
     if definitions:
         lines.append("[definitions]")

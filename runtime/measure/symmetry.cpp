@@ -55,6 +55,17 @@ void append(std::string& sum, double coefficient, const std::string& factor) {
     sum += size == 1 ? factor : fmt::format("{:.6g}*{}", size, factor);
 }
 
+// Of a linear map that is no rotation in a plane of the coordinates: by the signs of its entries.
+std::string kind_of(const MatrixXd& B) {
+    bool turns = true, scales = true;
+    for (Eigen::Index k = 0; k < B.rows(); ++k)
+        for (Eigen::Index l = 0; l < B.cols(); ++l) {
+            turns = turns && (k == l ? B(k, k) == 0 : B(k, l) * B(l, k) < 0 || (B(k, l) == 0 && B(l, k) == 0));
+            scales = scales && (k == l || B(k, l) == 0);
+        }
+    return turns ? "rotation" : scales ? "scaling" : "linear symmetry";
+}
+
 Symmetry symmetry_of(const MatrixXd& B, const VectorXd& d, const std::vector<std::string>& names) {
     const Eigen::Index n = d.size();
     Symmetry symmetry;
@@ -77,7 +88,7 @@ Symmetry symmetry_of(const MatrixXd& B, const VectorXd& d, const std::vector<std
     else if (moved.size() == 2 && B(moved[0], moved[0]) == 0 && B(moved[0], moved[1]) == -B(moved[1], moved[0]))
         symmetry.kind = fmt::format("rotation in the ({}, {}) plane", name(moved[0]), name(moved[1]));
     else
-        symmetry.kind = "rotation";
+        symmetry.kind = kind_of(B);
     return symmetry;
 }
 
@@ -95,7 +106,7 @@ struct Samples {
 Samples sample_conditions(const Kernel& kernel, LoadedStepper<double>& stepper, const std::vector<double>& q) {
     const Eigen::Index n = static_cast<Eigen::Index>(q.size());
     Samples samples;
-    samples.entries = n <= 12 ? n * n : 0;
+    samples.entries = n <= most_turned ? n * n : 0;
     samples.unknowns = samples.entries + n;
     samples.wanted = 4 * samples.unknowns;
     const Eigen::Index entries = samples.entries, wanted = samples.wanted;

@@ -16,12 +16,13 @@ namespace lobatto {
 struct Symmetry {
     std::vector<double> B;  // n x n, row-major
     std::vector<double> d;  // n
-    std::string kind;       // "translation", "rotation in the (x, y) plane", "rotation"
+    std::string kind;       // "translation", "rotation in the (x, y) plane", "rotation", "scaling", "linear symmetry"
     std::string momentum;   // "p_x + p_y", "x*p_y - y*p_x"
 };
 
 // All of them, as far as slopes sampled around q tell; `names` are those of the coordinates. Their number of entries
-// grows with n^2: among more than 12 coordinates only translations are looked for, among more than 64 nothing.
+// grows with n^2: among more than most_turned coordinates only translations are looked for, among more than 64 nothing.
+constexpr int most_turned = 16;
 std::vector<Symmetry> find_symmetries(const Kernel& kernel, const std::vector<double>& parameters,
                                       const std::vector<double>& q, double step, const std::vector<std::string>& names);
 

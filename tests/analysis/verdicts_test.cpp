@@ -115,11 +115,11 @@ TEST_CASE("a momentum that is a difference at rest has its velocity where the mo
 }
 
 TEST_CASE("a force that vanishes on the node of a wave is not called one that has lost its digits") {
-    const test::Finished wave = run(
-        "lagrangian = \"sum(i=1..n, u[i]'^2/2) - sum(i=1..n-1, (u[i+1]-u[i])^2/2 + (u[i+1]-u[i])^4/16)"
-        " - u[1]^2/2 - u[n]^2/2\"\n[coordinates]\n"
-        "u = { count = \"n\", position = \"sin(2*pi*i/(n+1))\", velocity = 0 }\n"
-        "[parameters]\nn = { value = 7, constant = true }\n[method]\npoints = 5\n[run]\nstep = 0.1\nuntil = 20\n");
+    const test::Finished wave =
+        run("lagrangian = \"sum(i=1..n, u[i]'^2/2) - sum(i=1..n-1, (u[i+1]-u[i])^2/2 + (u[i+1]-u[i])^4/16)"
+            " - u[1]^2/2 - u[n]^2/2\"\n[coordinates]\n"
+            "u = { count = \"n\", position = \"sin(2*pi*i/(n+1))\", velocity = 0 }\n"
+            "[parameters]\nn = { value = 7, constant = true }\n[method]\npoints = 5\n[run]\nstep = 0.1\nuntil = 20\n");
     CHECK(wave.exit_code == 0);
     CHECK(wave.err == "");
 }

@@ -37,6 +37,29 @@ TEST_CASE("what other programs call otherwise is told by our name") {
     CHECK(test::contains(told(oscillator("x'^2/2 - x^2/2", "step = 0.1\nstart = 5")), "A run begins at t = 0"));
 }
 
+TEST_CASE("slips of a blackboard are told how they are written") {
+    CHECK(test::contains(told(oscillator("v^2/2 - x^2/2", "step = 0.1")), "The velocity of x is written x'."));
+    CHECK(test::contains(told(oscillator("x'^2/2 - e^x", "step = 0.1")), "Write exp(...)."));
+    CHECK(test::contains(told(oscillator("(x'^2 + y'^2)/2", "step = 0.1")),
+                         "A coordinate y needs a line y = { position = ..., velocity = ... } under [coordinates]."));
+    CHECK(test::contains(told("L = \"x'^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"),
+                         "Write lagrangian = \"...\"."));
+    const std::string plane =
+                          "[coordinates]\nx = { position = 0, velocity = 1 }\ny = { position = -1, velocity = 0 }\n",
+                      steps = "[run]\nstep = 0.1\nuntil = 1\n";
+    CHECK(test::contains(told("lagrangian = \"(x'^2 + y'^2)/2 + l*(x^2 + y^2 - 1)\"\n" + plane +
+                              "l = { position = 0, velocity = 0 }\n" + steps),
+                         "write that as an equation under [constraints]"));
+    CHECK(test::contains(told("lagrangian = \"sqrt(x'^2 + y'^2)\"\n" + plane + steps), "Take its square"));
+    CHECK(test::contains(told("lagrangian = \"(x'^2 + y'^2)/2\"\n" + plane + steps +
+                              "[impacts]\n\"hit[i,j]\" = { when = \"x = y\", count = 2 }\n"),
+                         "scene.toml:9:1: an array of impacts has one index"));
+    const std::string degrees =
+        "lagrangian = \"x'^2/2 + cos(x)\"\n[coordinates]\n"
+        "x = { position = 30, velocity = 0, unit = \"deg\" }\n";
+    CHECK(test::contains(told(degrees + steps, 0), "take it for radians"));
+}
+
 TEST_CASE("what stands in the wrong place is told where it belongs") {
     CHECK(test::contains(told(oscillator("x'^2/2 - x^2/2", "step = 0.1", "[output]\nevents = [\"x == 0\"]\n")),
                          "write one =, not =="));

@@ -500,3 +500,12 @@ def test_a_thread_that_tunes_does_not_hold_up_those_that_read_scenes():
             "print('done')\n") % ((str(SCENES / "pendulum.toml"),) * 2)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0 and done.stdout == "done\n", done.stderr
+
+
+def test_a_lagrangian_without_velocities_or_without_its_time_is_told_in_words_of_python():
+    with pytest.raises(lobatto.InputError, match="the velocity of x is written x'"):
+        lobatto.Lagrangian("m*xdot^2/2 - k*x^2/2", x=(1, 0), m=1, k=2)
+    with pytest.raises(lobatto.InputError, match='say Lagrangian.*time="t"'):
+        lobatto.Lagrangian("x'^2/2 - x^2/2 + x*cos(t)", x=(1, 0))
+    with pytest.raises(lobatto.InputError, match="give the parameter another name"):
+        lobatto.Lagrangian("x'^2/2 - t*x^2/2", x=(1, 0), t=2)

@@ -36,7 +36,8 @@ bool is_at_rest(const SystemOutline& system, const std::vector<std::vector<doubl
     if (rows.empty()) return false;
     std::vector<double> least, most, sizes;
     for (const std::vector<double>& row : rows) widen_to(least, most, row.data() + 1, row.size() - 1);
-    if (system.constraints.empty()) return stays_within(few_roundings * epsilon, rows.front().data() + 1, least, most);
+    if (system.constraints.empty())  // the start alone is no motion
+        return rows.size() > 1 && stays_within(few_roundings * epsilon, rows.front().data() + 1, least, most);
     const ConstraintSizes constraints(system);
     for (const std::vector<double>& row : rows) constraints.widen(sizes, row[0], row.data() + 1, parameters);
     const std::vector<bool> moves = moving(least, most, places_of(least, most, sizes), rounding_of_run(epsilon));

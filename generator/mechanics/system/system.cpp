@@ -25,6 +25,19 @@ namespace {
 using GiNaC::ex;
 using Symbols = std::vector<GiNaC::symbol>;
 
+// Whether this direction is that of the velocity, which no energy opposes where L is homogeneous of degree 1.
+bool is_along_velocity(const System& system, const Formulas& formulas, const std::vector<cln::cl_R>& direction) {
+    cln::cl_R product = 0, size = 0, length = 0;
+    for (std::size_t k = 0; k < system.v.size(); ++k) {
+        const cln::cl_R v = formulas.get(system.v[k]);
+        product = product + v * direction[k];
+        size = size + v * v;
+        length = length + direction[k] * direction[k];
+    }
+    return system.constraints.empty() &&
+           cln::abs(product * product - size * length) < cln::expt(cln::cl_RA(10), -30) * size * length;
+}
+
 // Refuses a mass matrix that is singular near the start.
 void check_mass(const Scene& scene, const System& system) {
     for (int attempt = 0;; ++attempt) {
@@ -41,6 +54,11 @@ void check_mass(const Scene& scene, const System& system) {
                                   "is degenerate: it is linear in the velocities, as phase-space and guiding-centre "
                                   "Lagrangians are, whose momenta tell no velocity; write the motion with its kinetic "
                                   "energy");
+            if (is_along_velocity(system, formulas, elimination.vector))
+                refuse_lagrangian(
+                    scene,
+                    "is degenerate: twice the velocity makes it twice as large, as the length of a path, so "
+                    "no velocity follows from momenta. Take its square, which has the same paths");
             refuse_lagrangian(
                 scene,
                 "is degenerate: its second derivatives in the velocities form a singular matrix, so velocities "

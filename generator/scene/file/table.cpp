@@ -29,6 +29,7 @@ std::string advice_for(const std::string& key, const std::vector<std::string>& k
         {"time", "until"},  {"duration", "until"}, {"t_final", "until"}, {"T", "until"}};
     if (table == "[run]" && (key == "start" || key == "t0" || key == "begin" || key == "t_start"))
         return " A run begins at t = 0: write t + 5 for t in the formulas to begin at 5.";
+    if (table == "a scene" && (key == "L" || key == "Lagrangian")) return " Write lagrangian = \"...\".";
     if (table == "[method]" && key == "splitting") return " Write family = \"splitting\" and stages = 11.";
     if (const std::string section = section_of(key); table.starts_with('[') && !section.empty())
         return fmt::format(" It belongs into [{}].", section);

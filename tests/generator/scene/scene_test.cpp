@@ -303,9 +303,11 @@ TEST_CASE("a coordinate cannot have the name of another's momentum, in either or
 
 TEST_CASE("names that are never used are refused") {
     check_error(6, "k = 4\nlength = 2", {7, 1}, "parameter length occurs in no formula; use it or remove it");
-    check_error(3, "q = { position = 1, velocity = 0 }\nx = { position = 1, velocity = 0 }", {1, 14},
-                "the Lagrangian is degenerate: the velocity x' of coordinate x does not occur in it; add the kinetic "
-                "energy of x, or remove the coordinate");
+    check_error(
+        3, "q = { position = 1, velocity = 0 }\nx = { position = 1, velocity = 0 }", {1, 14},
+        "the Lagrangian is degenerate: the velocity x' of coordinate x does not occur in it; add the kinetic "
+        "energy of x, or remove the coordinate; if x multiplies what shall be 0, write that as an equation under "
+        "[constraints]");
     CHECK(read(with_line(9, "until = \"late\"\n[parameters.late]\nvalue = 3")).parameters.size() == 3);
 }
 
@@ -548,11 +550,15 @@ TEST_CASE("a definition is its formula wherever its name stands, and its prime i
           at + "13:8: the definition y needs its own value: definitions must not refer to one another in a circle");
     CHECK(error("y[1]", "\"y[i]\" = \"y[i+1]\"\n").find("definitions need one another without end here") !=
           std::string::npos);
-    CHECK(error("q'", "y = 3\n") == at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
+    CHECK(error("q'", "y = 3\n") ==
+          at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
     // Nor do definitions that only one another use.
-    CHECK(error("q'", "y = \"z\"\nz = \"y\"\n") == at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
-    CHECK(error("q'", "y = \"y + 1\"\n") == at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
-    CHECK(error("q'", "y = 3\nz = \"2*y\"\n") == at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
+    CHECK(error("q'", "y = \"z\"\nz = \"y\"\n") ==
+          at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
+    CHECK(error("q'", "y = \"y + 1\"\n") ==
+          at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
+    CHECK(error("q'", "y = 3\nz = \"2*y\"\n") ==
+          at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
     CHECK(error("y*q'", "y = \"1/(a - a)\"\n") == at + "12:7: division by zero in the definition y");
     CHECK(error("y[2]*q'", "\"y[i]\" = \"1/(i - 2)\"\n") == at + "12:12: division by zero in the definition y (i = 2)");
     CHECK(error("y[1,2]*q'", "\"y[i]\" = \"i\"\n") == at + "2:16: the definition y is written y[i]");
