@@ -144,7 +144,9 @@ namespace {
 bool has_sine_of(const GiNaC::ex& formula, const GiNaC::symbol& x) {
     if (GiNaC::is_a<GiNaC::function>(formula) && formula.has(x)) {
         const std::string name = GiNaC::ex_to<GiNaC::function>(formula).get_name();
-        if (name == "sin" || name == "cos" || name == "tan") return true;
+        if ((name == "sin" || name == "cos" || name == "tan") &&
+            formula.op(0).diff(x).info(GiNaC::info_flags::integer))  // else a factor such as pi/180 converts it
+            return true;
     }
     return std::any_of(formula.begin(), formula.end(), [&](const GiNaC::ex& part) { return has_sine_of(part, x); });
 }
@@ -153,11 +155,12 @@ bool has_sine_of(const GiNaC::ex& formula, const GiNaC::symbol& x) {
 std::vector<std::string> degrees_in_sines(const Scene& scene) {
     std::vector<std::string> texts;
     for (const Coordinate& coordinate : scene.coordinates) {
-        const bool is_degrees = coordinate.unit.starts_with("deg") || coordinate.unit == "\u00b0";
+        const bool is_degrees = coordinate.unit == "deg" || coordinate.unit == "degree" ||
+                                coordinate.unit == "degrees" || coordinate.unit == "\u00b0";
         if (is_degrees && has_sine_of(scene.lagrangian, coordinate.position))
             texts.push_back(
                 fmt::format("{0} has the unit {1}, but its sine and cosine take it for radians: units convert "
-                            "nothing. Write position = \"30*pi/180\" and unit = \"rad\"",
+                            "nothing. Write the start as 30*pi/180 for 30 degrees, and unit = \"rad\"",
                             coordinate.written, coordinate.unit));
     }
     return texts;

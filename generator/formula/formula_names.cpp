@@ -181,7 +181,7 @@ void Parser::refuse_by_role(const Syntax& formula, std::string_view base) const 
     const auto is_declared = [&](const std::string& written) {
         return std::find(declared.begin(), declared.end(), written) != declared.end();
     };
-    if (scope_.motion_allowed && name.ends_with("'"))
+    if (scope_.motion_allowed && advice.empty() && name.ends_with("'"))
         advice = fmt::format(
             " A coordinate {0} needs a line {0} = {{ position = ..., velocity = ... }} under "
             "[coordinates].",

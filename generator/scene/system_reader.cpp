@@ -243,10 +243,9 @@ void SystemReader::refuse_unused() const {
         if (known.used) use(known);
     for (const auto& [name, entry] : definition_lines_)
         if (!used.contains(name))
-            fail(entry->at,
-                 fmt::format(
-                     "definition {} occurs in no formula of the scene; use it (keep in [output] is one) or remove it",
-                     entry->key));
+            fail(entry->at, fmt::format("definition {} occurs in no formula of the scene; use it in one, such as keep "
+                                        "in [output], or remove it",
+                                        entry->key));
     for (const auto& [name, what] : {std::pair{"parameters", "parameter"}, std::pair{"inputs", "input"}}) {
         const Entry* section = root_.find(name);
         if (section == nullptr) continue;

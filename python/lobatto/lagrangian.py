@@ -82,7 +82,9 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
     if not coordinates:
         raise InputError("no velocity stands in the Lagrangian: the velocity of x is written x', as in m*x'^2/2")
     stands = r"(?<![A-Za-z0-9_])t(?![A-Za-z0-9_'\[]|\s*=[^=])"
-    if not time and "t" not in {*variables, *(definitions or {})} and any(re.search(stands, f) for f in formulas):
+    if not time and "t" not in {*variables, *(definitions or {})} and not extra and any(
+            re.search(stands, plain) for plain in (re.sub("#[^\n]*", "", f) for f in formulas)
+            if not re.search(r"\bt\s*=[^=]", plain)):
         raise InputError("t stands in a formula: if it is the time, say Lagrangian(..., time=\"t\")")
     coordinates = {name: _coordinate(name, value) for name, value in coordinates.items()}
     if definitions:

@@ -253,6 +253,12 @@ TEST_CASE("an equilibrium is no motion that is lost, wherever it is") {
                                                 "y=0,1", "-o", at_rest.folder / "sweep.csv"});
         CHECK_MESSAGE(swept.exit_code == 0, swept.err);
     }
+    // Beside one that rests far away, a motion is measured by itself: these steps are too long for it.
+    const test::MeasuredScene far(
+        "lagrangian = \"R'^2/2 + th'^2/2 + cos(th) - th^4*1e5\"\n[coordinates]\nR = { position = 1.5e11, velocity = 0 "
+        "}\n"
+        "th = { position = 0, velocity = 1e-3 }\n[run]\nstep = 2.2\nuntil = 1000\n");
+    CHECK(far.run().exit_code == 3);
     // One that is left because it is unstable is told: y is beside 1 by less than any double can say.
     const test::MeasuredScene unstable(
         "lagrangian = \"(x'^2 + y'^2)/2 + (y - x - 1)^2/2\"\n[coordinates]\nx = { position = 0, velocity = 0 }\n"

@@ -9,15 +9,12 @@
 
 namespace lobatto {
 
-// Whether positions stay where they begin but for this part of themselves, or of the farthest where they begin at 0.
-// start: q; least, most: of q and p.
-bool stays_within(double part, const double* start, const std::vector<double>& least, const std::vector<double>& most);
-
-// A motion whose positions only rounding moves, and of which a companion that begins beside it goes no far way either:
-// such a one has no amplitude.
-bool rests_beside_companion(const double* start, const std::vector<double>& least, const std::vector<double>& most,
-                            const std::vector<double>& least_of_companion, const std::vector<double>& most_of_companion,
-                            double epsilon);
+// A motion whose positions and momenta stay where they begin but for rounding: of themselves, or of the farthest where
+// they begin at 0. Its companion, which begins beside it, stays near, too. Such a motion has no amplitude.
+// start, least, most: of q, then p.
+bool rests_beside_companion(const std::vector<double>& start, const std::vector<double>& least,
+                            const std::vector<double>& most, const std::vector<double>& least_of_companion,
+                            const std::vector<double>& most_of_companion, double epsilon);
 
 // `rows`: states t, q, p, the start first, computed in numbers with this epsilon.
 bool is_at_rest(const SystemOutline& system, const std::vector<std::vector<double>>& rows,

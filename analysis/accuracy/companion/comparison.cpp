@@ -104,8 +104,9 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
                 widen_to(all.least, all.most, row.data(), row.size());
                 widen_to(of_companion.least, of_companion.most, row.data(), row.size());
             }
-    if (comparisons > 0 && rests_beside_companion(request_.q.data(), range_.least, range_.most, of_companion.least,
-                                                  of_companion.most, run_epsilon_))
+    const std::vector<double> first = row_at(0);
+    if (comparisons > 0 && rests_beside_companion({first.begin() + 1, first.end()}, range_.least, range_.most,
+                                                  of_companion.least, of_companion.most, run_epsilon_))
         return std::vector<double>(2 * n, 0.0);
     std::vector<double> by_constraints;
     constraints_.widen(by_constraints, request_.time, request_.q.data(), parameters_);

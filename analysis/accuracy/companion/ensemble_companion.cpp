@@ -222,8 +222,8 @@ std::vector<double> EnsembleCompanion::amplitudes(
     };
     for (std::int64_t i = 0; i < 2 * comparisons; ++i)
         widen_to(of_companion[0], of_companion[1], range_of_companion(i), 2 * n);
-    if (comparisons > 0 &&
-        rests_beside_companion(kept.rows + 1, least, most, of_companion[0], of_companion[1], kernel_->epsilon))
+    if (comparisons > 0 && rests_beside_companion({kept.rows + 1, kept.rows + kept.columns}, least, most,
+                                                  of_companion[0], of_companion[1], kernel_->epsilon))
         return std::vector<double>(2 * n, 0.0);
     for (std::int64_t i = 0; i < 2 * comparisons; ++i) widen_to(least, most, range_of_companion(i), 2 * n);
     std::vector<double> by_constraints;

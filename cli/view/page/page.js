@@ -285,7 +285,7 @@ class Chart {
     static ticks(low, high, count) {
         const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
         const step = [1, 2, 5, 10].map(s => s * power).find(s => s >= rough * 0.999), result = [];
-        for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k)
+        for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step && result.length <= 4 * count; ++k)
             result.push([k * step, Chart.number(k * step, step)]);
         return result;
     }
@@ -296,7 +296,7 @@ class Chart {
             low = Math.min(low, curve.y.least); high = Math.max(high, curve.y.most);
             if (curve.x) { left = Math.min(left, curve.x.least); right = Math.max(right, curve.x.most); }
         }
-        const widen = (a, b) => b > a ? [a - 0.06 * (b - a), b + 0.06 * (b - a)] : [a - (Math.abs(a) || 1) * 0.1, b + (Math.abs(b) || 1) * 0.1];
+        const widen = (a, b) => b - a > 1e-14 * Math.abs(a) ? [a - 0.06 * (b - a), b + 0.06 * (b - a)] : [a - (Math.abs(a) || 1) * 0.1, b + (Math.abs(b) || 1) * 0.1];
         [low, high] = widen(low, high);
         if (this.options.phase) [left, right] = widen(left, right);
         this.ticks = Chart.ticks(low, high, Math.max(2, height / 45));

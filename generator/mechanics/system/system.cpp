@@ -26,7 +26,10 @@ using GiNaC::ex;
 using Symbols = std::vector<GiNaC::symbol>;
 
 // Whether this direction is that of the velocity, which no energy opposes where L is homogeneous of degree 1.
-bool is_along_velocity(const System& system, const Formulas& formulas, const std::vector<cln::cl_R>& direction) {
+bool is_along_velocity(const System& system, Formulas& formulas, const std::vector<cln::cl_R>& direction) {
+    ex rest = -system.lagrangian;  // v . dL/dv - L
+    for (std::size_t k = 0; k < system.v.size(); ++k) rest += system.v[k] * system.momentum[k];
+    if (!formulas.evaluate_sized(formulas.convert({rest})).front().vanishes()) return false;
     cln::cl_R product = 0, size = 0, length = 0;
     for (std::size_t k = 0; k < system.v.size(); ++k) {
         const cln::cl_R v = formulas.get(system.v[k]);

@@ -55,7 +55,7 @@ private:
 // Increments that no longer shrink are rounding up to `noise` units of what they are computed from.
 template <class real>
 struct NewtonConvergence {
-    static constexpr int iteration_limit = 40, noise = 64, noise_after = 4;
+    static constexpr int iteration_limit = 40, noise = 64, noise_after = 20;
 
     static bool reached(int iteration, real e, real e_before) {
         return e <= Limits<real>::root_epsilon ||

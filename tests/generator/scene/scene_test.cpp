@@ -550,15 +550,15 @@ TEST_CASE("a definition is its formula wherever its name stands, and its prime i
           at + "13:8: the definition y needs its own value: definitions must not refer to one another in a circle");
     CHECK(error("y[1]", "\"y[i]\" = \"y[i+1]\"\n").find("definitions need one another without end here") !=
           std::string::npos);
-    CHECK(error("q'", "y = 3\n") ==
-          at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
+    CHECK(error("q'", "y = 3\n") == at + "12:1: definition y occurs in no formula of the scene; use it in one, such as "
+                                         "keep in [output], or remove it");
     // Nor do definitions that only one another use.
-    CHECK(error("q'", "y = \"z\"\nz = \"y\"\n") ==
-          at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
-    CHECK(error("q'", "y = \"y + 1\"\n") ==
-          at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
-    CHECK(error("q'", "y = 3\nz = \"2*y\"\n") ==
-          at + "12:1: definition y occurs in no formula of the scene; use it (keep in [output] is one) or remove it");
+    CHECK(error("q'", "y = \"z\"\nz = \"y\"\n") == at + "12:1: definition y occurs in no formula of the scene; use it "
+                                                        "in one, such as keep in [output], or remove it");
+    CHECK(error("q'", "y = \"y + 1\"\n") == at + "12:1: definition y occurs in no formula of the scene; use it in one, "
+                                                 "such as keep in [output], or remove it");
+    CHECK(error("q'", "y = 3\nz = \"2*y\"\n") == at + "12:1: definition y occurs in no formula of the scene; use it in "
+                                                      "one, such as keep in [output], or remove it");
     CHECK(error("y*q'", "y = \"1/(a - a)\"\n") == at + "12:7: division by zero in the definition y");
     CHECK(error("y[2]*q'", "\"y[i]\" = \"1/(i - 2)\"\n") == at + "12:12: division by zero in the definition y (i = 2)");
     CHECK(error("y[1,2]*q'", "\"y[i]\" = \"i\"\n") == at + "2:16: the definition y is written y[i]");
