@@ -10,6 +10,8 @@ namespace lobatto {
 
 namespace {
 
+constexpr double vanishing = 0x1p-40;  // of the largest force on an array: on the node of a wave there is none
+
 // dL/dq + F in 60 digits, of which differences of L leave some 20.
 class ExactForce {
 public:
@@ -81,16 +83,19 @@ double force_rounding(const Outline& outline, const LoadedStepper<double>& stepp
     for (std::size_t k = 0; k < n; ++k) {
         if (!moves[k]) continue;
         // All of them together change no momentum beyond its own rounding.
-        double latest = 0, momentum = 0, largest = 0;
+        double latest = 0, momentum = 0, largest = 0, of_array = 0;
         for (const std::vector<double>& row : rows) {
             latest = std::fmax(latest, std::fabs(row[0]));
             momentum = std::fmax(momentum, std::fabs(row[1 + n + k]));
         }
         if (errors[k] * latest <= 0x1p-53 * momentum) continue;
         for (const std::vector<cln::cl_R>& force : forces)
-            for (std::size_t other = 0; other < n; ++other)
-                if (groups[other] == groups[k])
-                    largest = std::fmax(largest, std::fabs(cln::double_approx(force[other])));
+            for (std::size_t other = 0; other < n; ++other) {
+                const double size = std::fabs(cln::double_approx(force[other]));
+                if (other == k) largest = std::fmax(largest, size);
+                if (groups[other] == groups[k]) of_array = std::fmax(of_array, size);
+            }
+        if (largest < vanishing * of_array) largest = of_array;
         if (largest > 0) worst = std::fmax(worst, errors[k] / largest);
     }
     return worst;

@@ -299,7 +299,8 @@ void fail_where_it_failed(const Scene& scene, const TrajectoryResult& result, co
         throw ExitCode{interrupted_exit};
     }
     if (*Interruption::flag() != 0) {
-        tell("lobatto: interrupted while the error was measured; the whole run is in {}\n", files.path());
+        tell("lobatto: interrupted after the last step; the whole run {}.\n",
+             is_standard_output(files.path()) ? "was written" : "is in " + files.path());
         throw ExitCode{interrupted_exit};
     }
 }

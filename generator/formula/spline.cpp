@@ -143,7 +143,8 @@ public:
         }
         if (!good)
             fail(begin,
-                 fmt::format("{} is missing, or no finite number such as 1.25 or 1e-3: a line has two of them", what));
+                 fmt::format("{} is missing, or is not a finite number such as 1.25 or 1e-3: a line has two of them",
+                             what));
         return value(text_.substr(begin, next_ - begin), exponent, begin);
     }
     void separator() {

@@ -90,7 +90,7 @@ SystemReader::ArrayName SystemReader::declare_array(const Entry& entry, const st
     if (!subject.subscripted) return {name, std::nullopt};
     if (subject.indices.size() != 1)
         fail(entry.at, fmt::format("an array of {0}s has one index without another meaning: write \"{1}[i]\", and for "
-                                   "pairs one line for each distance, as \"{1}_1[i]\"",
+                                   "pairs one line for each distance: {1}_1 of i and i + 1, {1}_2 of i and i + 2",
                                    what, name));
     return {name, std::string(subject.indices.front().text)};
 }

@@ -203,16 +203,16 @@ void SystemReader::require_velocities() const {
     const GiNaC::exset symbols = symbols_of(scene_.lagrangian);
     for (const Coordinate& coordinate : scene_.coordinates)
         if (symbols.count(coordinate.velocity) == 0)
-            fail(
-                entry->value.at,
-                fmt::format(
-                    "the Lagrangian is degenerate: the velocity {0}' of coordinate {0} does not occur in it; "
-                    "add the kinetic energy of {0}, or remove the coordinate; if {0} multiplies what shall be 0, write "
-                    "that as an equation under [constraints]{1}",
-                    coordinate.written,
-                    scene_.not_eliminated.empty() ? ""
-                                                  : ". Equations would give it some, but not all are eliminated. " +
-                                                        scene_.not_eliminated.front()));
+            fail(entry->value.at,
+                 fmt::format("the Lagrangian is degenerate: the velocity {0}' of coordinate {0} does not occur in it; "
+                             "add the kinetic energy of {0}, or remove the coordinate; if {0} is a multiplier, write "
+                             "its condition "
+                             "as an equation under [constraints]{1}",
+                             coordinate.written,
+                             scene_.not_eliminated.empty()
+                                 ? ""
+                                 : ". Equations would give it some, but not all are eliminated. " +
+                                       scene_.not_eliminated.front()));
 }
 
 // Those values that the Lagrangian and the forces asked for.

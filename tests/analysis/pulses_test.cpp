@@ -73,3 +73,21 @@ TEST_CASE("pulses in sweeps and in clean arithmetic, and the checks of their ste
     // Columns of the sweep before the positions: number, a, status, steps, time.
     for (int k = 1; k <= chains[0].n; ++k) CHECK(std::abs(rows[1][4 + k] - alone[k]) < 1e-13);
 }
+
+TEST_CASE("a fast coordinate beside it does not change how the steps of a slow one are solved") {
+    // Newton's iteration comes up an exponential wall by its width at a time: no rounding, though the width is small.
+    const auto end_beside = [](const char* speed) {
+        const MeasuredScene wall(
+            "lagrangian = \"A'^2/2 + b'^2/2 - c^2*(exp(b/c) - b/c)\"\n[coordinates]\n"
+            "A = { position = 0, velocity = " +
+            std::string(speed) +
+            " }\nb = { position = -400e-9, velocity = 0 }\n"
+            "[parameters]\nc = 1e-9\n[run]\nstep = 1\nuntil = 29\n");
+        wall.run({"--unmeasured"});
+        return wall.end();
+    };
+    const std::vector<double> alone = end_beside("0"), beside = end_beside("1000");
+    CHECK(alone[0] == beside[0]);
+    CHECK(alone[2] == beside[2]);
+    CHECK(alone[4] == beside[4]);
+}

@@ -49,7 +49,7 @@ TEST_CASE("slips of a blackboard are told how they are written") {
                       steps = "[run]\nstep = 0.1\nuntil = 1\n";
     CHECK(test::contains(told("lagrangian = \"(x'^2 + y'^2)/2 + l*(x^2 + y^2 - 1)\"\n" + plane +
                               "l = { position = 0, velocity = 0 }\n" + steps),
-                         "write that as an equation under [constraints]"));
+                         "write its condition as an equation under [constraints]"));
     CHECK(test::contains(told("lagrangian = \"sqrt(x'^2 + y'^2)\"\n" + plane + steps), "Take its square"));
     CHECK(test::contains(told("lagrangian = \"(x'^2 + y'^2)/2\"\n" + plane + steps +
                               "[impacts]\n\"hit[i,j]\" = { when = \"x = y\", count = 2 }\n"),

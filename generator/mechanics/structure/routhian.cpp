@@ -13,7 +13,7 @@ namespace {
 
 using GiNaC::ex;
 
-constexpr std::size_t most_cyclic = 3;  // their velocities follow from the inverse of a matrix of formulas
+constexpr std::size_t most_cyclic = 3;  // formulas of their velocities grow with each of them
 
 bool contains(const std::vector<int>& list, int value) {
     return std::find(list.begin(), list.end(), value) != list.end();

@@ -7,6 +7,7 @@
 #define LOBATTO_KERNEL_NEWTON_HPP
 
 #include <type_traits>
+#include <utility>
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
@@ -30,7 +31,7 @@ struct NewtonIteration {
         real v[n], base[(s - 1) * n];        // what is known of a step before it is solved (D11)
         real Q[room], W[room], delta[room];  // at the interior nodes
         real S[(m > 0 ? m : 1) * entry_room];
-        real inverse_scale[n], sorted[room];
+        real inverse_scale[n], sorted[room], net;  // net: of increments, relative
         Matrix matrix;
     };
     struct Outcome {
@@ -102,7 +103,7 @@ private:
 
     // Adds the increments to the positions; their largest size, or not a number.
     static real apply_increments(Arrays& a) {
-        real e = real(0), sum = real(0);
+        real e = a.net = real(0);
         for (int i = 0; i < m; ++i)
             for (int k = 0; k < n; ++k) {
                 const real d = fabs(a.delta[i * n + k]);
@@ -110,10 +111,10 @@ private:
                 // A coordinate at rest that only the others move: its own displacement is the measure.
                 if (a.inverse_scale[k] == real(0) && d > real(0)) relative = d / (d + fabs(a.Q[i * n + k]));
                 e = relative > e ? relative : e;
-                sum += relative;
+                a.net += a.delta[i * n + k] < real(0) ? -relative : relative;
             }
         for (int i = 0; i < N; ++i) a.Q[i] += a.delta[i];
-        return is_finite(sum) ? e : sum - sum;
+        return is_finite(a.net) ? e : a.net - a.net;
     }
 
     // Whether increments that no longer shrink are within `roundings` of what they are computed from: positions and
@@ -132,9 +133,8 @@ private:
         return true;
     }
 
-    // The largest increment where all are far below the largest displacement within the step; else 0. Where Newton's
-    // iteration does not make such increments smaller, they are the rounding of forces that cancel, as in exp(a) -
-    // exp(b): those of a coordinate that hardly moves may be much larger than its motion.
+    // The largest increment, if all are far below the largest displacement within the step; else 0. Newton's iteration
+    // goes to and fro by such where terms cancel, as in exp(a) - exp(b), and their rounding moves what hardly moves.
     static real noise_of(const Arrays& a) {
         real most = real(0), of_farthest = Limits<real>::largest;
         for (int k = 0; k < n; ++k)
@@ -143,11 +143,10 @@ private:
         return most * of_farthest <= Limits<real>::root_epsilon ? most : real(0);
     }
 
-    // At the end the accelerations are carried to the final positions to first order, which errs by the same e^2 as the
-    // positions.
+    // At the end accelerations are carried to the final positions to first order, which errs by e^2 as they do.
     static void newton(const Coefficients& k, real h, real time, Arrays& a, Outcome& outcome) {
         const Stages stages(h);
-        real previous = Limits<real>::largest;
+        real previous = Limits<real>::largest, net_before = real(0);
         for (int iteration = 1; iteration <= Rule::iteration_limit; ++iteration) {
             for (int i = 0; i < m; ++i)
                 Formulas<K>::node(k, node_time(time, h, i), a.Q + i * n, a.W + i * n, a.S + i * K::entries);
@@ -163,7 +162,8 @@ private:
                 return;
             }
             const bool stagnates = Rule::stagnates(iteration, e, previous);
-            if (stagnates && iteration > Rule::noise_after) outcome.noise = noise_of(a);
+            const bool returns = fabs(a.net + std::exchange(net_before, a.net)) < real(0.5) * fabs(a.net);
+            if (stagnates && returns && iteration > Rule::noise_after) outcome.noise = noise_of(a);
             if (K::linear || Rule::reached(iteration, e, previous) || outcome.noise > real(0) ||
                 (stagnates && is_rounding(h, a, a.S, K::entries, Rule::noise))) {
                 stages.carry(a.S, K::entries, a.delta, a.W);

@@ -88,11 +88,11 @@ TEST_CASE("expressions of tables are differentiated order by order, with the cha
 TEST_CASE("a bad file is told with line and column") {
     CHECK(error_of("0, 1\n1 2 3\n") == "m.csv:2:5: a line has two numbers, an argument and its value, and no more");
     CHECK(error_of("0, 1\n1\n") ==
-          "m.csv:2:2: the value is missing, or no finite number such as 1.25 or 1e-3: a line has two of them");
+          "m.csv:2:2: the value is missing, or is not a finite number such as 1.25 or 1e-3: a line has two of them");
     CHECK(error_of("0, 1\nx, 2\n") ==
-          "m.csv:2:1: the argument is missing, or no finite number such as 1.25 or 1e-3: a line has two of them");
+          "m.csv:2:1: the argument is missing, or is not a finite number such as 1.25 or 1e-3: a line has two of them");
     CHECK(error_of("t, M\nalso a heading\n1, 2\n") ==
-          "m.csv:2:1: the argument is missing, or no finite number such as 1.25 or 1e-3: a line has two of them");
+          "m.csv:2:1: the argument is missing, or is not a finite number such as 1.25 or 1e-3: a line has two of them");
     CHECK(error_of("0, 1\n0.0, 2\n") ==
           "m.csv:2:1: arguments must ascend: this one is not above that of the line before");
     CHECK(error_of("0, 1e999\n1, 1\n") == "m.csv:1:4: this number is beyond 1e-300 to 1e300");

@@ -303,11 +303,10 @@ TEST_CASE("a coordinate cannot have the name of another's momentum, in either or
 
 TEST_CASE("names that are never used are refused") {
     check_error(6, "k = 4\nlength = 2", {7, 1}, "parameter length occurs in no formula; use it or remove it");
-    check_error(
-        3, "q = { position = 1, velocity = 0 }\nx = { position = 1, velocity = 0 }", {1, 14},
-        "the Lagrangian is degenerate: the velocity x' of coordinate x does not occur in it; add the kinetic "
-        "energy of x, or remove the coordinate; if x multiplies what shall be 0, write that as an equation under "
-        "[constraints]");
+    check_error(3, "q = { position = 1, velocity = 0 }\nx = { position = 1, velocity = 0 }", {1, 14},
+                "the Lagrangian is degenerate: the velocity x' of coordinate x does not occur in it; add the kinetic "
+                "energy of x, or remove the coordinate; if x is a multiplier, write its condition as an equation under "
+                "[constraints]");
     CHECK(read(with_line(9, "until = \"late\"\n[parameters.late]\nvalue = 3")).parameters.size() == 3);
 }
 
