@@ -12,7 +12,8 @@ namespace lobatto {
 
 // The largest error of a force that the kernel computes at these states (rows t, q, p), against 60 digits, as a part of
 // the largest size of that force there, or of those on its array (`groups`: amplitude_groups) where it vanishes beside
-// them. Of the coordinates that move; 0 where there are more than most_looked_at. `stepper` is prepared with `parameters`.
+// them. Of the coordinates that move; 0 where there are more than most_looked_at. `stepper` is prepared with
+// `parameters`.
 inline constexpr std::size_t most_looked_at = 16;
 double force_rounding(const Outline& outline, const LoadedStepper<double>& stepper,
                       const std::vector<double>& parameters, const std::vector<std::vector<double>>& rows,
