@@ -10,11 +10,13 @@
 namespace lobatto {
 namespace {
 
+using GiNaC::ex;
+
 constexpr std::size_t most_constraints = 4096, longest_equation = 1000;
 
 }  // namespace
 
-// x = ..., "x[3]" = ..., or "x[i]" = ... for all elements; forces on one coordinate add up.
+// x = ..., "x[3]" = ..., or "x[i]" = ... for all elements; or of a definition. Forces on one coordinate add up.
 void SystemReader::read_forces() {
     const Entry* section = root_.find("forces");
     if (section == nullptr) return;
@@ -22,8 +24,13 @@ void SystemReader::read_forces() {
         const Scope in_key{&names_, "[forces]", true, {}};
         const Text key = text_of_key(entry);
         const Subject subject = parse_subject(source_, key, in_key);
-        const Group& group = group_of(subject);
         Scope scope{&names_, "the force on " + entry.key, true, {}};
+        if (const auto name = names_.all.find(subject.name.text);
+            name != names_.all.end() && name->second.role == Name::Role::definition) {
+            add_force_along(subject, entry, scope);
+            continue;
+        }
+        const Group& group = group_of(subject);
         long first = 1, last = static_cast<long>(group.count);
         if (!subject.indices.empty()) {
             scope.indices = {std::string(subject.indices.front().text)};
@@ -45,18 +52,55 @@ void SystemReader::read_forces() {
     }
 }
 
+// By virtual work: what moves r by dr moves the coordinates by dq, so the force on q_k is F dr/dq_k. Of a rate w, F w
+// is its power, and the force on q_k is F dw/dq_k'.
+void SystemReader::add_force_along(const Subject& subject, const Entry& entry, const Scope& scope) {
+    const std::string name(subject.name.text);
+    if (!subject.indices.empty())
+        fail(subject.name.at, fmt::format("{0} is a definition: write one line for each of its elements, such as "
+                                          "\"{0}[1]\" =",
+                                          name));
+    const Text& key = keys_.emplace_back(text_of_key(entry));
+    const Scope in_key{&names_, entry.key, true, {}};
+    const Operand along = evaluate(source_, parse_formula(source_, key, in_key), in_key);
+    const Operand force = evaluate(source_, parse_formula(source_, formula_of(source_, entry), scope), scope);
+    const Arithmetic arithmetic(scope.formula, names_.work);
+    bool acts = false;
+    for (Coordinate& coordinate : scene_.coordinates) {
+        const ex slope = along.expression.diff(along.velocities ? coordinate.velocity : coordinate.position);
+        if (slope.is_zero()) continue;
+        acts = true;
+        if (along.velocities && holds_velocity(slope))
+            fail(subject.name.at, fmt::format("{} is not linear in the velocities, so no force acts along it", name));
+        if (coordinate.force.is_zero()) coordinate.force_at = entry.value.at;
+        try {
+            coordinate.force += arithmetic.multiply(force, operand_of(slope)).expression;
+        } catch (const Refusal& refusal) {
+            fail(entry.value.at, refusal.what());
+        }
+    }
+    if (!acts) fail(subject.name.at, fmt::format("{} holds no coordinate, so no force acts along it", name));
+}
+
+bool SystemReader::holds_velocity(const ex& expression) const {
+    const GiNaC::exset held = symbols_of(expression);
+    return std::any_of(scene_.coordinates.begin(), scene_.coordinates.end(),
+                       [&](const Coordinate& c) { return held.count(c.velocity) > 0; });
+}
+
 const SystemReader::Group& SystemReader::group_of(const Subject& subject) const {
     const std::string name(subject.name.text);
     const auto found =
         std::find_if(groups_.begin(), groups_.end(), [&](const Group& g) { return g.entry->key == name; });
     if (found == groups_.end()) {
-        std::vector<std::string> known;
-        for (const Group& group : groups_) known.push_back(group.entry->key);
-        const std::string advice =
-            name.ends_with(".omega") ? " A torque on a body acts on the four numbers of its .q (docs/scene_format.md)."
-                                     : suggestion(name, known);
-        fail(subject.name.at, fmt::format("unknown coordinate '{}' in [forces]; coordinates: {}.{}", name.substr(0, 40),
-                                          listing(known), advice));
+        std::vector<std::string> coordinates, known;
+        for (const Group& group : groups_) coordinates.push_back(group.entry->key);
+        known = coordinates;
+        for (const auto& [of, what] : names_.all)
+            if (what.role == Name::Role::definition) known.push_back(of);
+        fail(subject.name.at,
+             fmt::format("'{}' in [forces] is neither a coordinate nor a definition; coordinates: {}.{}",
+                         name.substr(0, 40), listing(coordinates), suggestion(name, known)));
     }
     if (found->array && !subject.subscripted)
         fail(subject.name.at,

@@ -73,12 +73,12 @@ TEST_CASE("plane bodies on hinges are the double pendulum in angles, those on a 
     CHECK(std::fabs(cart[1] - by_hand[1]) < 1e-12);
 }
 
-TEST_CASE("a torque on a body is a force on its quaternion, by the formulas of the documents") {
+TEST_CASE("a torque on a body is a force along its angular velocity, by the lines of the documents") {
     std::string forces;
     std::istringstream document(test::read_file(LOBATTO_SOURCE_DIR "/docs/scene_format.md"));
     for (std::string line; std::getline(document, line);)
-        if (line.starts_with("\"top.q[")) forces += line + "\n";
-    REQUIRE(std::count(forces.begin(), forces.end(), '\n') == 4);
+        if (line.starts_with("\"top.omega[")) forces += line + "\n";
+    REQUIRE(std::count(forces.begin(), forces.end(), '\n') == 3);
     const std::vector<double> q = end_of(
         "lagrangian = \"0\"\n[bodies]\ntop = { mass = 1, inertia = [0.75, 0.6, 0.5], angular_velocity = [0.2, -0.1, "
         "0.3] "
@@ -106,6 +106,27 @@ TEST_CASE("a torque on a body is a force on its quaternion, by the formulas of t
     }
     REQUIRE(q.size() == 7);
     for (std::size_t i = 0; i < 4; ++i) CHECK(q[3 + i] == doctest::Approx(x[i]).epsilon(1e-9));
+}
+
+// Kane's formulas, the partial velocities written by hand.
+TEST_CASE("forces on the point of an arm, torques on its links and dampers between them are those on its angles") {
+    const std::string arm =
+        "[bodies]\na = { mass = 1, inertia = 0.1, position = [0.5, 0] }\n"
+        "b = { mass = 1, inertia = 0.1, position = [1.5, 0] }\n[joints]\n"
+        "j = { type = \"hinge\", bodies = [\"ground\", \"a\"], point = [0, 0] }\n"
+        "k = { type = \"hinge\", bodies = [\"a\", \"b\"], point = [1, 0], velocity = 0.3 }\n";
+    const std::vector<double> along = end_of(arm +
+                                             "[definitions]\ntip = \"b.y(0.5, 0)\"\nbend = \"k.angle' + j.angle'/10\"\n"
+                                             "[forces]\n\"b.omega\" = \"-5*b.omega\"\n\"a.angle\" = 2\n"
+                                             "tip = \"0.7*cos(b.x)\"\nbend = \"-bend/5\"\n");
+    const std::vector<double> by_hand =
+        end_of(arm +
+               "[definitions]\nF = \"0.7*cos(b.x)\"\nx1 = \"cos(j.angle)\"\nx2 = \"cos(j.angle + k.angle)\"\n"
+               "w = \"j.angle' + k.angle'\"\nbend = \"k.angle' + j.angle'/10\"\n[forces]\n"
+               "\"j.angle\" = \"-5*w + 2 + F*(x1 + x2) - bend/50\"\n\"k.angle\" = \"-5*w + F*x2 - bend/5\"\n");
+    REQUIRE(along.size() == 2);
+    for (std::size_t i = 0; i < 2; ++i) CHECK(along[i] == doctest::Approx(by_hand[i]).epsilon(1e-13));
+    CHECK(std::fabs(along[0]) > 0.1);
 }
 
 TEST_CASE("a hinge in space leaves one angle, with the moment of inertia about its axis") {

@@ -577,8 +577,13 @@ TEST_CASE("a definition is its formula wherever its name stands, and its prime i
 }
 
 TEST_CASE("forces act on coordinates") {
-    check_error_of_chain(13, "\"y[i]\" = 1", {13, 2}, "unknown coordinate 'y' in [forces]; coordinates: x.");
-    check_error_of_chain(13, "a = 1", {13, 1}, "unknown coordinate 'a' in [forces]; coordinates: x.");
+    check_error_of_chain(13, "\"y[i]\" = 1", {13, 2},
+                         "'y' in [forces] is neither a coordinate nor a definition; coordinates: x.");
+    check_error_of_chain(13, "a = 1", {13, 1},
+                         "'a' in [forces] is neither a coordinate nor a definition; coordinates: x.");
+    check_error_of_chain(13, "V_end = 1", {13, 1},
+                         "'V_end' in [forces] is neither a coordinate nor a definition; coordinates: x. Did you mean "
+                         "'V_ends'?");
     check_error_of_chain(13, "x = 1", {13, 1},
                          "x is an array: write \"x[i]\" for the force on each of its elements, \"x[1]\" for that on "
                          "the first");
@@ -588,10 +593,42 @@ TEST_CASE("forces act on coordinates") {
                          "there is no x[0]: the array has the elements x[1] to x[3] (i = 1)");
     check_error(9, "until = 1\n[forces]\n\"q[1]\" = 2", {11, 2},
                 "q is a coordinate, not an array: write q without brackets");
-    check_error(9, "until = 1\n[forces]\nqq = 2", {11, 1}, "unknown coordinate 'qq' in [forces]; coordinates: q.");
+    check_error(9, "until = 1\n[forces]\nqq = 2", {11, 1},
+                "'qq' in [forces] is neither a coordinate nor a definition; coordinates: q.");
     check_error(9, "until = 1\n[forces]\nq = \"-velocity\"", {11, 7},
                 "unknown name 'velocity' in the force on q; declared: k, m, q, q'.");
     CHECK(read(oscillator).coordinates[0].force.is_zero());
+}
+
+TEST_CASE("forces act along definitions, by their work") {
+    const std::string pair =
+        "lagrangian = \"(x'^2 + y'^2)/2 + 0*(r + s[1] + w + T + one)\"\n[coordinates]\nx = { position = 1, velocity = "
+        "0 }\n"
+        "y = { position = 2, velocity = 0 }\n[run]\nstep = 0.1\nuntil = 1\n[definitions]\n"
+        "r = \"sqrt(x^2 + y^2)\"\n\"s[i]\" = \"x + i*y\"\nw = \"x*y'\"\nT = \"x'^2\"\none = \"x'^2/x'^2\"\n";
+    const auto forces = [&](const std::string& lines) {
+        const Scene scene = read(pair + "[forces]\n" + lines);
+        return std::vector<GiNaC::ex>{scene.coordinates[0].force, scene.coordinates[1].force,
+                                      scene.coordinates[0].position, scene.coordinates[1].position,
+                                      scene.coordinates[1].velocity};
+    };
+    const auto is = [](const GiNaC::ex& a, const GiNaC::ex& b) { return (a - b).expand().normal().is_zero(); };
+    const auto central = forces("r = \"-3*r\"");
+    CHECK(is(central[0], -3 * central[2]));
+    CHECK(is(central[1], -3 * central[3]));
+    const auto sum = forces("\"s[3]\" = \"y\"\ny = 1");
+    CHECK(is(sum[0], sum[3]));
+    CHECK(is(sum[1], 3 * sum[3] + 1));
+    const auto power = forces("w = \"w\"");
+    CHECK(power[0].is_zero());
+    CHECK(is(power[1], GiNaC::pow(power[2], 2) * power[4]));
+    const auto refused = [&](const std::string& line, int column, const std::string& message) {
+        check_error_in(pair + "[forces]\n" + line, {15, column}, message);
+    };
+    refused("\"s[i]\" = 1", 2, "s is a definition: write one line for each of its elements, such as \"s[1]\" =");
+    refused("T = 1", 1, "T is not linear in the velocities, so no force acts along it");
+    refused("one = 1", 1, "one holds no coordinate, so no force acts along it");
+    refused("r = \"q\"", 6, "unknown name 'q' in the force on r; declared: T, one, r, s[i], w, x, x', y, y'.");
 }
 
 TEST_CASE("the method is Lobatto's or Gauss's") {
