@@ -184,7 +184,11 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
                       RunObservers& observers, bool accepts_lost) {
     const Scene& scene = run.scene;
     RunVerdict verdict;
-    if (observers.companion) verdict.error = observers.companion->finish(result, request.interrupted);
+    if (observers.companion)
+        verdict.error = observers.companion->finish(result, [&] {
+            if (request.progress) request.progress(result.steps_done);
+            return request.interrupted == nullptr || *request.interrupted == 0;
+        });
     if (verdict.error && !verdict.error->complete && run.outline.conserves_energy() && result.energy_start != 0 &&
         result.energy_error_largest > told_by_energy * verdict.error->at_end * std::fabs(result.energy_start))
         verdict.error->at_end = std::nan("");

@@ -5,6 +5,7 @@
 
 #include <lobatto/lobatto.hpp>
 
+#include <array>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -165,6 +166,36 @@ TEST_CASE("in sweeps such a trajectory is measured by a companion of its own") {
             CAPTURE(i);
             CHECK(cut_off.error[i] > 0.5 * std::fabs(cut_off.q[i] - true_place(starts.columns["k"][i], 0.5)) / 0.5);
         }
+    }
+}
+
+// A FODO cell of length 2 has quadrupoles of length 0.4 around s = 0 and 1, and nothing between. Its matrix is that of
+// textbooks (E. D. Courant and H. S. Snyder 1958). Here each step is cut, none is whole.
+TEST_CASE("the error in a lattice of hard edges is measured over thousands of cells, in steps that fit it or do not") {
+    using Matrix = std::array<long double, 4>;
+    const auto times = [](const Matrix& a, const Matrix& b) {
+        return Matrix{a[0] * b[0] + a[1] * b[2], a[0] * b[1] + a[1] * b[3], a[2] * b[0] + a[3] * b[2],
+                      a[2] * b[1] + a[3] * b[3]};
+    };
+    const long double w = std::sqrt(3.0L), c = std::cos(w / 5), s = std::sin(w / 5), C = std::cosh(w * 2 / 5),
+                      S = std::sinh(w * 2 / 5);
+    const Matrix focus{c, s / w, -s * w, c}, drift{1, 0.6L, 0, 1}, defocus{C, S / w, S * w, C};
+    Matrix cells = times(focus, times(drift, times(defocus, times(drift, focus))));
+    for (int doublings = 0; doublings < 11; ++doublings) cells = times(cells, cells);  // 2048 of them
+    for (const double step : {1.0, 2.0, 0.1}) {
+        CAPTURE(step);
+        const MeasuredScene scene(fmt::format(
+            "time = \"s\"\nlagrangian = \"x'^2/2 - K*(if(cos(pi*s) > edge, 1, 0) - if(cos(pi*s) < -edge, 1, "
+            "0))*x^2/2\"\n[coordinates]\nx = {{ position = 1, velocity = 0 }}\n[parameters]\nK = 3\nedge = "
+            "\"cos(pi/5)\"\n[run]\nstep = {}\nuntil = 4096\n[output]\nevery = {}\n",
+            step, std::lround(16 / step)));
+        const test::Finished finished = scene.run();
+        INFO(finished.err);
+        REQUIRE(finished.exit_code == 0);
+        const double error = std::fabs(scene.end()[1] - static_cast<double>(cells[0])),
+                     printed = absolute_error(finished.out);
+        CHECK(printed > error / 2);
+        CHECK(printed < error * 2);
     }
 }
 

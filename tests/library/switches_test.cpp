@@ -178,6 +178,28 @@ TEST_CASE("switches of what grows all the time are passed for ever") {
     CHECK(wall.t.back() == doctest::Approx(2500));
 }
 
+TEST_CASE("a motion that starts late, where a switch of the time is largest, passes it") {
+    for (const double start : {2.0, 200.0, 1782.0, 200000.0})
+        for (const double step : {2.25, 1.6, 0.45, 0.17307692307692307}) {
+            CAPTURE(start);
+            CAPTURE(step);
+            lob::Settings settings;
+            settings.step = fmt::format("{:.17g}", step);
+            lob::Stepper stepper(lob::compile(
+                scene_of("time = \"t\"\nlagrangian = \"x'^2/2 - if(cos(pi*t) > 0.809, 1, 0)*x\"\n[coordinates]\n"
+                         "x = { position = 0, velocity = 0 }\n[run]\nstep = 1\nuntil = 1\n"),
+                settings));
+            const double q = 0, p = 1;
+            stepper.start(start, &q, &p);
+            REQUIRE(stepper.advance(12));
+            // The force is -1 where |t| < w modulo 2.
+            const double w = std::acos(0.809) / std::acos(-1.0), end = 12 * step, whole = std::floor((end + w) / 2),
+                         rest = end - 2 * whole;
+            const double on = 2 * w * whole - w + (rest < w ? rest + w : 2 * w);
+            CHECK(stepper.p()[0] == doctest::Approx(1 - on).epsilon(1e-9));
+        }
+}
+
 TEST_CASE("the sides of switches are no parameters that others set") {
     const lob::Scene scene = scene_of(collision("4*max(0, -x)^2"));
     CHECK(scene.parameters().size() == 1);

@@ -25,8 +25,9 @@ constexpr double graded = 8;            // steps are at most this part of the di
 constexpr double finest = 0x1p-30;      // steps are never shorter than this part of those of the run
 constexpr double same_time = 0x1p-48;   // relative: times that differ by no more differ by rounding
 constexpr double same_as_rounded = 16;  // likewise, roundings of the kernel's numbers
-// Terms that are looked at along steps of the companion, for what is narrow in them; a step counts as some, at least.
-constexpr std::int64_t most_looked = 4000000, looked_a_step = 8;
+// Evaluations of terms along steps of the companion, for what is narrow in them: three of each in a step without.
+constexpr std::int64_t most_evaluations = 12'000'000;
+constexpr int polls = 500;  // of one that is waited for, before who waits is asked whether to go on
 
 }  // namespace
 
@@ -201,8 +202,7 @@ void Companion::take_one(CompanionPlace& place, double from, const std::vector<d
 
 // That the motion met in the last step.
 std::optional<Pulse> Companion::narrow_term(CompanionPlace& place, const std::vector<double>& step) {
-    if (narrow_.empty() || looked_ >= most_looked) return std::nullopt;
-    looked_ += std::max(looked_a_step, static_cast<std::int64_t>(narrow_.count()));
+    if (narrow_.empty() || evaluations_ >= most_evaluations) return std::nullopt;
     const CompanionPlace::State& before = place.before;
     const double from = before.time.front();
     NarrowTerms::State begin{from, rounded(before.q, parts_), {}},
@@ -212,7 +212,7 @@ std::optional<Pulse> Companion::narrow_term(CompanionPlace& place, const std::ve
         return std::nullopt;
     begin.v = rounded(begin.v, parts_);
     end.v = rounded(end.v, parts_);
-    return narrow_.on_the_way(begin, end);
+    return narrow_.on_the_way(begin, end, evaluations_);
 }
 
 std::vector<double> Companion::step_of(const Segment& part) const {
@@ -225,10 +225,12 @@ void Companion::take(CompanionPlace& place, const Segment& part) {
     const std::vector<double> whole_size = step_of(part);
     const std::int64_t piece = std::clamp<std::int64_t>(request_.steps / amplitude_looks, 1, most_at_once);
     std::int64_t done = 0;
+    contacts_.set_whole_step(size);
     while (done < part.taken && place.status == LOBATTO_OK && !cancelled_) {
         const double here = from + static_cast<double>(done) * size;
         if (done == part.taken / 2) contacts_.look_at_usual_change();
-        const bool looks = !is_clocked() && (contacts_.is_sought() || (!narrow_.empty() && looked_ < most_looked));
+        const bool looks =
+            !is_clocked() && (contacts_.is_sought() || (!narrow_.empty() && evaluations_ < most_evaluations));
         std::int64_t count = 0;
         const bool is_even = pulses_.empty() && knots_.empty() && !contacts_.is_any();
         while (!looks && count < std::min(piece, part.taken - done) &&
@@ -294,6 +296,7 @@ void Companion::compare_at_stop(double longest) {
         const double wanted = std::ceil(way.front() / request_.step * ratio_of(segment(0)));
         const std::int64_t steps = std::max<std::int64_t>(1, std::llround(wanted));
         const std::vector<double> step = times_fraction(way, 1, steps);
+        contacts_.set_whole_step(step.front());
         const bool is_even = pulses_.empty() && knots_.empty() && narrow_.empty() && !contacts_.is_sought();
         const Stopwatch watch;
         for (std::int64_t done = 0; done < steps && place.status == LOBATTO_OK;) {
@@ -418,8 +421,13 @@ bool Companion::has_compared() const {
     return !companion_.empty();
 }
 
-std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result, const volatile int* interrupted) {
-    const auto goes_on = [&] { return interrupted == nullptr || *interrupted == 0; };
+std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result, const std::function<bool()>& asked) {
+    int count = 0;
+    bool is_wanted = true;
+    const auto goes_on = [&] {
+        if (asked && is_wanted && count++ % polls == 0) is_wanted = asked();
+        return is_wanted;
+    };
     const bool has_end =
         result.status == LOBATTO_OK && !result.interrupted && (result.steps_done > 0 || result.stop >= 0);
     if (has_end) {

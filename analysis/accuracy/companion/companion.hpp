@@ -19,6 +19,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -73,8 +74,8 @@ public:
     // Where a stop ended the run, the companion is compared there too.
     // Waits for the companion, where it computes in finer numbers or the run took less than a second of processor time,
     // and compares what there is; else that is as much as was computed beside the run. Nothing: the run was stopped, or
-    // took no step. interrupted: not 0 once it shall wait no longer.
-    std::optional<MeasuredError> finish(const TrajectoryResult& result, const volatile int* interrupted = nullptr);
+    // took no step. asked: now and then, whether to wait on.
+    std::optional<MeasuredError> finish(const TrajectoryResult& result, const std::function<bool()>& asked = {});
 
 private:
     struct Point {
@@ -130,12 +131,12 @@ private:
     NarrowTerms narrow_;           // likewise, where the motion meets them
     ConstraintSizes constraints_;  // what rounding in them moves positions by
     std::vector<double> parameters_;
-    std::vector<double> knots_;  // of measured values in time, at which its steps end
-    std::int64_t looked_ = 0;    // at terms, along steps of the companion
-    bool is_driven_ = false;     // explicit time, without a clock
-    ShortContacts contacts_;     // which the steps of the run may miss, too
-    Range way_;                  // since the last comparison
-    std::int64_t stride_;        // steps of the run between comparisons
+    std::vector<double> knots_;     // of measured values in time, at which its steps end
+    std::int64_t evaluations_ = 0;  // of terms, along steps of the companion
+    bool is_driven_ = false;        // explicit time, without a clock
+    ShortContacts contacts_;        // which the steps of the run may miss, too
+    Range way_;                     // since the last comparison
+    std::int64_t stride_;           // steps of the run between comparisons
     std::int64_t seen_ = 0;
     std::vector<Point> run_;         // of the run, at comparisons
     std::vector<double> stop_time_;  // where a stop ended it, as parts; empty: none did

@@ -28,7 +28,7 @@ void ShortContacts::begin(CompanionPlace& place, double from) const {
 
 bool ShortContacts::is_met(CompanionPlace& place, const std::vector<double>& step) {
     if (!is_cut_) return false;
-    if (looks_at_usual_ && std::isinf(place.cuts.last())) {
+    if (looks_at_usual_ && !is_part(step.front()) && std::isinf(place.cuts.last())) {
         const std::vector<double> change = change_in_parts(place, step, 1, 2), here = place.rounded_row();
         usual_change_.resize(change.size());
         for (std::size_t i = 0; i < change.size(); ++i)
@@ -59,14 +59,15 @@ std::optional<Pulse> ShortContacts::found(CompanionPlace& place, const std::vect
     }
     const double gap = place.cuts.gap(), middle = place.cuts.middle();
     place.go_back(after);
-    if (!(gap < longest && gap < undivided * size)) return std::nullopt;
+    if (!(gap < longest && gap < undivided * whole_step_)) return std::nullopt;
     return Pulse{middle, gap};
 }
 
 // Whether parts of a contact lead elsewhere by much more than halves of steps do that nothing cuts. Where they do not,
-// whole steps are better: parts would only change the energy.
+// whole steps are better: parts would only change the energy. Where steps are in parts for another contact, this one
+// is, too.
 bool ShortContacts::matters(CompanionPlace& place, const std::vector<double>& step, const Pulse& contact) const {
-    if (usual_change_.empty()) return true;
+    if (usual_change_.empty() || is_part(step.front())) return true;
     const double size = std::fabs(step.front()), parts = std::ceil(2 * size / contact.width),
                  to_its_end = std::fabs(contact.time - place.before.time.front()) + contact.width / 2;
     if (!(parts <= most_parts_on_trial)) return true;

@@ -4,6 +4,7 @@
 // its companion; so the companion takes it in parts, where that matters.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -15,6 +16,8 @@
 namespace lobatto {
 
 class ShortContacts {
+    static constexpr double nearly_whole = 0.999;  // of a step: all but rounding
+
 public:
     // Of a companion for this request, which outlives this. Nothing is looked for in scenes without walls and switches.
     ShortContacts(bool is_cut, const TrajectoryRequest& request) : is_cut_(is_cut), request_(request) {}
@@ -32,10 +35,13 @@ public:
     // After a step that ends where one of the run does: what is left of it after a cut is then the same piece in both,
     // with the same error, however few derivatives the force has there. It is taken in two, where that matters.
     void divide_rest(CompanionPlace& place, const std::vector<double>& step) const;
-    // The next step that nothing cuts tells again what halves of such steps change.
+    // Of the companion, where it is not divided.
+    void set_whole_step(double size) { whole_step_ = std::fabs(size); }
+    // The next whole step that nothing cuts tells again what halves of such steps change.
     void look_at_usual_change() { looks_at_usual_ = true; }
 
 private:
+    bool is_part(double step) const { return std::fabs(step) < nearly_whole * whole_step_; }
     bool is_notable(const std::vector<double>& change) const;
     std::optional<Pulse> found(CompanionPlace& place, const std::vector<double>& step) const;
     bool matters(CompanionPlace& place, const std::vector<double>& step, const Pulse& contact) const;
@@ -48,6 +54,7 @@ private:
     std::vector<Pulse> contacts_;       // in the order of time
     std::vector<double> usual_change_;  // of q and p, where a step that nothing cuts is halved
     bool looks_at_usual_ = true;
+    double whole_step_ = 0;
 };
 
 }  // namespace lobatto

@@ -36,8 +36,13 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
     variables.insert(variables.end(), system.parameters.begin(), system.parameters.end());
     const Tape::Variables numbered(variables);
     GiNaC::exset known;
+    bool is_kinetic = false;
     const auto add = [&](Kind kind, const ex& u) {
         if (terms_.size() == most_terms || !known.insert(u).second) return;
+        // Near the speed of light 1 - v^2 is small, and where the way is not that of the motion, smaller: but a mass
+        // that grows with the velocity hinders nothing.
+        const auto holds = [&](const GiNaC::symbol& v) { return u.has(v); };
+        if (is_kinetic && std::any_of(system.v.begin(), system.v.end(), holds)) return;
         std::vector<std::size_t> coordinates;
         for (std::size_t k = 0; k < system.q.size(); ++k)
             if (u.has(system.q[k]) || u.has(system.v[k])) coordinates.push_back(k);
@@ -72,9 +77,12 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
             }
         }
     };
+    is_kinetic = true;
     look_at(system.lagrangian);
+    is_kinetic = false;
     for (const ex& force : system.outer_force) look_at(force);
     for (const Constraint& constraint : system.constraints) look_at(constraint.value);
+    is_kinetic = true;
     for (const auto& [place, mass] : system.momentum_v.entries())
         if (place.first == place.second) add(Kind::pole, mass);
 }
@@ -115,7 +123,7 @@ std::optional<NarrowTerms::Found> NarrowTerms::narrow_place(Kind kind, const U& 
     return {};
 }
 
-std::optional<Pulse> NarrowTerms::on_the_way(const State& from, const State& to) const {
+std::optional<Pulse> NarrowTerms::on_the_way(const State& from, const State& to, std::int64_t& evaluations) const {
     const std::size_t n = from.q.size();
     const double duration = to.time - from.time;
     std::vector<double> variables(1 + 2 * n);
@@ -123,6 +131,7 @@ std::optional<Pulse> NarrowTerms::on_the_way(const State& from, const State& to)
     std::optional<Found> narrowest;
     for (const Term& term : terms_) {
         const auto u = [&](double s) {
+            ++evaluations;
             variables[0] = from.time + s * duration;
             const double r = 1 - s;
             for (const std::size_t k : term.coordinates) {

@@ -4,6 +4,7 @@
 // and see nothing.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,8 +27,9 @@ public:
         double time;
         std::vector<double> q, v;
     };
-    // The narrowest that is met on the cubic way between two states, if it is narrower than half of that.
-    std::optional<Pulse> on_the_way(const State& from, const State& to) const;
+    // The narrowest that is met on the cubic way between two states, if it is narrower than half of that. Adds to
+    // `evaluations` those of terms.
+    std::optional<Pulse> on_the_way(const State& from, const State& to, std::int64_t& evaluations) const;
     // Whether steps of this length may be too long for a term, as it looks from a state: on the straight line through
     // it, `reach` steps to both sides.
     bool may_be_met(const State& at, double step, double reach) const;

@@ -50,14 +50,15 @@ struct Sides {
         return status;
     }
     // sum |du/dx x| over the time, positions and velocities: what a rounding of these does to a switch u, over epsilon.
-    // Where that is known of an earlier place, anew if one of them has grown to more than twice of what it was there.
-    static void scale_switches(S& stepper, real time, const real* q, const real* p) {
+    // Where that is known of an earlier place, anew if one of them has grown to more than twice of what it was there;
+    // or `again`, because the slopes were small there, as where u is largest.
+    static void scale_switches(S& stepper, real time, const real* q, const real* p, bool again = false) {
         real x[1 + 2 * n] = {time}, here[K::events], there[K::events], scale[switches_of<K>()] = {};
         for (int k = 0; k < n; ++k) x[1 + k] = q[k];
         if (stepper.velocity(time, q, p, x + 1 + n) != Status::ok) return;
         bool has_grown = false;
         for (int k = 0; k <= 2 * n; ++k) has_grown = has_grown || fabs(x[k]) > real(2) * stepper.scaled_at[k];
-        if (!has_grown) return;
+        if (!has_grown && !again) return;
         for (int k = 0; k <= 2 * n; ++k) stepper.scaled_at[k] = fabs(x[k]);
         Formulas<K>::event(stepper.coefficients, x[0], x + 1, x + 1 + n, here);
         for (real& moved : x) {

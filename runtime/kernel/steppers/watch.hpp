@@ -121,7 +121,9 @@ private:
             real row[1 + 2 * n];
             status = events.state(theta, row);
             if constexpr (switches_of<K>() > 0)
-                if (status == Status::ok) Sides<K>::scale_switches(stepper, row[0], row + 1, row + 1 + n);
+                if (status == Status::ok)  // again at the second, third, fifth, ninth cut of a step
+                    Sides<K>::scale_switches(stepper, row[0], row + 1, row + 1 + n,
+                                             impacts > 0 && (impacts & (impacts - 1)) == 0);
             if (status == Status::ok) status = wall.look(stepper, row[0], row + 1, row + 1 + n);
             if (status == Status::ok) status = pass(stepper, wall, number - first_wall, rows, count);
             if (status != Status::ok) break;
