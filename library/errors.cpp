@@ -26,7 +26,7 @@ void rethrow() {
     } catch (const std::system_error& error) {
         throw MachineError(error.what());
     } catch (const std::bad_alloc&) {
-        throw MachineError("out of memory");
+        throw MachineError("out of memory; keep fewer states (every), or take fewer trajectories or an earlier end");
     } catch (const std::exception& error) {
         throw MachineError(std::string("internal error: ") + error.what() +
                            "\nThis is a mistake in Lobatto " LOBATTO_VERSION

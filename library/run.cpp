@@ -9,6 +9,8 @@ namespace lobatto::api {
 
 namespace {
 
+constexpr double most_bytes = 16e9;  // bytes of states
+
 void append(std::vector<double>& all, const double* first, std::size_t count) {
     all.insert(all.end(), first, first + count);
 }
@@ -42,7 +44,7 @@ void finish(Trajectory& trajectory, const OpenedRun& run, const TrajectoryResult
     trajectory.seconds = result.seconds;
     trajectory.interrupted = result.interrupted;
     if (result.stop >= 0) trajectory.stopped_by = trajectory.event_names[static_cast<std::size_t>(result.stop)];
-    trajectory.reaches_end = run.prepared().steps.reaches_end;
+    trajectory.reaches_end = ends_early(run.prepared(), result).empty();
     trajectory.warnings = verdict.warnings;
     if (!verdict.error) return;
     if (verdict.error->is_known_at_end()) trajectory.error = verdict.error->at_end;
@@ -63,10 +65,23 @@ Trajectory begun(const OpenedRun& run) {
     return trajectory;
 }
 
+// All states are kept in memory.
+void refuse_too_much(const OpenedRun& run) {
+    const TrajectoryRequest& request = run.request();
+    const double states = static_cast<double>(request.steps) / static_cast<double>(request.every) * (1 + request.dense),
+                 memory = states * (2 + 2 * static_cast<double>(request.q.size())) * sizeof(double);
+    if (memory > most_bytes)
+        throw lobatto::InputError(
+            fmt::format("--every: the {:.3g} states of the run would need {:.3g} GB of memory; give "
+                        "a larger number of steps between them",
+                        states, memory / 1e9));
+}
+
 }  // namespace
 
 Trajectory run(const Scene& scene, const RunOptions& options) {
     OpenedRun run(scene, options);
+    guarded([&] { refuse_too_much(run); });
     Trajectory trajectory = in_algebra([&] { return begun(run); });
     volatile int is_interrupted = 0;
     OpenedRun::Listeners listeners;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "analysis/sweep/warnings.hpp"
 #include "generator/formula/text/source.hpp"
 #include "library/opened_sweep.hpp"
 
@@ -151,14 +152,24 @@ Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& option
             };
         const std::int64_t every = kept_by_sweeps(overrides_of(options), swept);
         if (every > 0) sweep.states.first.push_back(0);
+        Worst worst;
         const auto sink = [&](const EnsembleTrajectory& trajectory, const Verdict& verdict,
                               const EnsembleRequest& request) {
             if (options.measure) sweep.error.push_back(verdict.error);
+            if (options.measure && verdict.status == LOBATTO_OK)
+                worst.see(verdict.error, static_cast<std::int64_t>(sweep.count));
             if (every > 0) keep_states(sweep, trajectory, request.every, every);
             keep(sweep, swept, trajectory, verdict.status);
         };
         sweep.interrupted = study->compute(0, count, sink, progress, &is_interrupted).interrupted;
-        sweep.warnings = in_algebra([&] { return study->end(); });
+        sweep.warnings = in_algebra([&] {
+            std::vector<std::string> warnings = warnings_of(*study, worst);
+            if (!study->first_setting().steps.reaches_end)
+                warnings.emplace_back(
+                    "the end time is not a multiple of the step: the runs end at the last multiple before it");
+            for (std::string& warning : study->end()) warnings.push_back(std::move(warning));
+            return warnings;
+        });
         return sweep;
     });
 }

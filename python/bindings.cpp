@@ -17,6 +17,7 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -94,6 +95,26 @@ auto unlocked(const Work& work) {
         throw;
     }
 }
+
+// Of a stepper that takes steps, while the interpreter's lock may be another thread's. The lock guards the set.
+class InUse {
+public:
+    explicit InUse(const lob::Stepper& stepper) : stepper_(&stepper) {
+        if (!all().insert(stepper_).second)
+            throw lob::InputError("this Stepper takes steps in another thread; give each thread its own, by copy()");
+    }
+    ~InUse() { all().erase(stepper_); }
+    InUse(const InUse&) = delete;
+    InUse& operator=(const InUse&) = delete;
+
+private:
+    static std::set<const lob::Stepper*>& all() {
+        static std::set<const lob::Stepper*> all;
+        return all;
+    }
+
+    const lob::Stepper* stepper_;
+};
 
 // In parts of about a twentieth of a second, between which Ctrl-C is heard; the motion stays where it was then.
 bool advance(lob::Stepper& stepper, std::int64_t steps) {
@@ -308,8 +329,13 @@ void add_scene(py::module_& module) {
     using Scenes = py::class_<lob::Scene, std::unique_ptr<lob::Scene, Freed>>;
     const py::call_guard<py::gil_scoped_release> without_lock;
     Scenes(module, "Scene", "A mechanical system, read from a scene file and checked.")
-        .def(py::init([](const std::filesystem::path& path) { return lob::Scene(path.string()); }), py::arg("path"),
-             without_lock)
+        .def(py::init([](const std::filesystem::path& path) {
+                 if (path.string().find('\n') != std::string::npos)
+                     throw lob::InputError(
+                         "this is the text of a scene, not the path of its file: write Scene.from_text(text)");
+                 return lob::Scene(path.string());
+             }),
+             py::arg("path"), without_lock)
         .def(py::pickle([](const lob::Scene& scene) { return py::make_tuple(scene.text(), scene.path()); },
                         [](const py::tuple& state) {
                             const auto text = state[0].cast<std::string>(), path = state[1].cast<std::string>();
@@ -355,14 +381,32 @@ void add_stepper(py::module_& module) {
                  return unlocked([&] { return lob::Stepper(lob::compile(scene, settings)); });
              }),
              py::arg("scene"))
-        .def("step", &lob::Stepper::step, "One step. False where a stop of the scene ended the motion.")
-        .def("advance", &advance, py::arg("steps"), "So many steps. False where a stop ended the motion.")
-        .def("advance_to", &advance_to, py::arg("t"),
-             "Equal steps while they fit, then a shorter one that ends at t exactly.")
+        .def(
+            "step",
+            [](lob::Stepper& stepper) {
+                const InUse in_use(stepper);
+                return stepper.step();
+            },
+            "One step. False where a stop of the scene ended the motion.")
+        .def(
+            "advance",
+            [](lob::Stepper& stepper, std::int64_t steps) {
+                const InUse in_use(stepper);
+                return advance(stepper, steps);
+            },
+            py::arg("steps"), "So many steps. False where a stop ended the motion.")
+        .def(
+            "advance_to",
+            [](lob::Stepper& stepper, double t) {
+                const InUse in_use(stepper);
+                return advance_to(stepper, t);
+            },
+            py::arg("t"), "Equal steps while they fit, then a shorter one that ends at t exactly.")
         .def(
             "start",
             [](lob::Stepper& stepper, double t, const py::object& q, const py::object& p, const py::object& velocity) {
                 if (p.is_none() == velocity.is_none()) throw lob::InputError("start: give p or velocity, one of them");
+                const InUse in_use(stepper);
                 const std::size_t n = stepper.coordinates();
                 const Array position = whole(q, "q"), rate = p.is_none() ? whole(velocity, "velocity") : whole(p, "p");
                 if (p.is_none())

@@ -31,6 +31,12 @@ std::string clock_advice(const Scene& scene) {
 // That nothing of the motion is left in the result, unless that was accepted. Empty: something is.
 std::string loss_of(const Scene& scene, const TrajectoryRequest& request, const std::optional<MeasuredError>& error) {
     if (!error || !error->is_lost()) return "";
+    if (error->rests)
+        return fmt::format(
+            "the run rests where it begins, q = {}, p = {}: this equilibrium is unstable, and a start that differs by "
+            "rounding leaves it. What a motion does that begins there is not known. Start elsewhere, or try "
+            "--beyond-horizon, where the run shall rest.",
+            list_text(request.q), list_text(request.p));
     const std::string clock = clock_advice(scene);
     const char* const why = error->companion_stopped
                                 ? "there the same run with 2/3 of the step cannot go on, and what follows is not known"

@@ -27,8 +27,9 @@ constexpr std::int64_t states_looked_at = 200;
 constexpr int most_starts = 24;                   // of the search for equilibria
 constexpr std::size_t most_for_eigenvalues = 64;  // coordinates: matrices of twice as many rows
 constexpr std::size_t most_reported_coordinates = 1024;
-constexpr std::int64_t most_steps = 10'000'000;  // of a run to look at, times coordinates
-constexpr int fine = 8;                          // steps of h/8 stand for the motion itself
+constexpr std::int64_t most_steps = 10'000'000;     // of a run to look at, times coordinates
+constexpr int fewest_parts = 8, most_parts = 4096;  // of a step: shorter ones stand for the motion itself
+constexpr double thrown = 1000;                     // times as far as anything before
 
 std::vector<double> plain(const VectorXd& values) {
     return {values.begin(), values.end()};
@@ -110,32 +111,76 @@ std::vector<State> states_along(const StabilityReport& report, TrajectoryRequest
     return states;
 }
 
+// How fast the motion is at a state, and oscillates near it: unknown at a singularity.
+struct Pace {
+    double speed = 0;  // of the fastest coordinate
+    std::optional<double> frequency;
+};
+
+Pace pace_at(const LoadedStepper<double>& stepper, Linearisation& linearisation, const State& state) {
+    std::vector<double> velocity;
+    if (stepper.velocity(state.time, plain(state.q), plain(state.p), velocity) != LOBATTO_OK) return {};
+    const Eigen::Map<const VectorXd> v(velocity.data(), state.q.size());
+    Pace pace{v.cwiseAbs().maxCoeff(), {}};
+    try {
+        pace.frequency = linearisation.at(state.time, state.q, v).largest_frequency();
+    } catch (const DomainError&) {
+    }
+    return pace;
+}
+
+// Steps beyond the first limit of the method may throw the motion far away. What follows says nothing of it.
+void leave_out_what_is_thrown(const StabilityReport& report, Linearisation& linearisation, std::vector<State>& states) {
+    if (report.member.limits.empty()) return;
+    const double limit = report.member.limits.front().approximation(20).to_double();
+    const auto size = [](const State& state) { return state.q.cwiseAbs().maxCoeff(); };
+    const auto first_beyond = [&](double extent) {
+        return std::find_if(states.begin(), states.end(),
+                            [&](const State& state) { return !(size(state) <= thrown * extent); });
+    };
+    double extent = size(states.front());
+    if (first_beyond(extent) == states.end()) return;
+    LoadedStepper<double> stepper(report.kernel);
+    stepper.prepare(report.parameters, report.step);
+    for (const State& state : states) {
+        const Pace pace = pace_at(stepper, linearisation, state);
+        extent = std::fmax(extent, std::fmax(size(state), report.step * pace.speed));
+        const double angle = report.step * pace.frequency.value_or(0);
+        if (angle * angle <= limit) continue;
+        states.erase(first_beyond(extent), states.end());
+        return;
+    }
+}
+
+// Into how many parts a step of this h omega is divided to stand for the motion itself.
+int parts_of(double angle) {
+    int parts = fewest_parts;
+    while (parts < most_parts && angle > parts) parts *= 2;
+    return parts;
+}
+
 TrajectoryReport trajectory_report(const StabilityReport& report, Linearisation& linearisation,
                                    const std::vector<State>& states) {
     TrajectoryReport result;
     result.states = std::ssize(states);
     LoadedStepper<double> stepper(report.kernel), finer(report.kernel);
     stepper.prepare(report.parameters, report.step);
-    finer.prepare(report.parameters, report.step / fine);
-    std::vector<double> velocity;
     for (const State& state : states) {
-        const std::vector<double> q = plain(state.q), p = plain(state.p);
-        try {
-            if (stepper.velocity(state.time, q, p, velocity) == LOBATTO_OK) {
-                const Eigen::Map<const VectorXd> v(velocity.data(), state.q.size());
-                if (const auto omega = linearisation.at(state.time, state.q, v).largest_frequency()) {
-                    ++result.frequencies_at;
-                    if (const double angle = report.step * *omega; angle * angle > result.largest_z) {
-                        result.largest_z = angle * angle;
-                        result.largest_z_time = state.time;
-                    }
-                }
-            }
-        } catch (const DomainError&) {  // at a singularity
+        const double angle = [&] {
+            const Pace pace = pace_at(stepper, linearisation, state);
+            if (pace.frequency) ++result.frequencies_at;
+            return report.step * pace.frequency.value_or(0);
+        }();
+        if (angle * angle > result.largest_z) {
+            result.largest_z = angle * angle;
+            result.largest_z_time = state.time;
         }
         if (state.q.size() > static_cast<Eigen::Index>(most_for_eigenvalues)) continue;
+        const std::vector<double> q = plain(state.q), p = plain(state.p);
         const auto values = step_eigenvalues(stepper, report.step, state.time, q, p);
-        const auto exact = step_eigenvalues(finer, report.step / fine, state.time, q, p, fine);
+        const int parts = parts_of(angle);
+        finer.prepare(report.parameters, report.step / parts);
+        const auto exact = step_eigenvalues(finer, report.step / parts, state.time, q, p, parts);
         if (!values || !exact) continue;
         ++result.looked_at;
         const double rate = std::log(std::abs(values->front())), exact_rate = std::log(std::abs(exact->front()));
@@ -271,7 +316,8 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides) {
     const std::int64_t steps = request.steps;
     request.steps = std::min(steps, most_steps / system.n);
     std::int64_t done = 0;
-    const std::vector<State> states = states_along(report, request, done);
+    std::vector<State> states = states_along(report, request, done);
+    leave_out_what_is_thrown(report, linearisation, states);
     if (system.autonomous && system.n <= static_cast<int>(most_for_eigenvalues)) {
         std::vector<VectorXd> starts{start};
         for (std::size_t i = 0; i < most_starts; ++i) starts.push_back(states[i * states.size() / most_starts].q);

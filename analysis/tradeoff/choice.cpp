@@ -111,14 +111,14 @@ Choice choose(const Scene& written, const Scene& scene, const ChoiceRequest& req
         if (!std::isfinite(least))
             throw ComputationError(fmt::format(
                 "nothing could be measured within {:.3g} s; give more time with --budget", request.seconds));
+        const bool is_late = experiment.left() <= 0 || !best.search.complete;
         throw ComputationError(fmt::format(
             "an error of {:.2g} to t = {:.6g} is not reached: {:.2g} is the least of the {} members of the family that "
-            "were tried{}{}. Ask for a larger error or an earlier end",
+            "were tried{}{}. {}sk for a larger error or an earlier end",
             request.error, reference.until, least, members,
             is_rounding ? "; it is rounding in double, which this motion makes so large" : "",
-            experiment.left() > 0 && best.search.complete
-                ? ""
-                : fmt::format(", and {:.3g} s were not enough for all (--budget)", request.seconds)));
+            is_late ? fmt::format(", and {:.3g} s were not enough for all", request.seconds) : "",
+            is_late ? "Give more time with --budget, or a" : "A"));
     }
     const Candidate& candidate = best.search.best->candidate;
     Choice choice;

@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "analysis/sweep/tally.hpp"
+#include "analysis/sweep/warnings.hpp"
 #include "cli/commands/commands.hpp"
 #include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
@@ -230,8 +231,8 @@ void sweep(const SweepOptions& options) {
     results.table->finish();
 
     const SweepTally& tally = results.tally;
+    for (std::string& warning : warnings_of(*study, tally.worst_error())) warnings.push_back(std::move(warning));
     for (const std::string& warning : warnings) tell("lobatto: warning: {}.\n", warning);
-    warn_of_errors(*study, tally);
     const std::int64_t asked = shard.last() - shard.first();
     if (options.json)
         fmt::print("{}", json_of_sweep(*study, tally, times, {asked, path, results.table->rows(), warnings}));

@@ -21,24 +21,6 @@ std::string spread_text(const Spread& spread) {
                        spread.rms);
 }
 
-// Which parameters that vary decide the step or the end time: those of the scene count, for all trajectories.
-void warn_of_fixed_times(const Scene& scene, const SweepStarts& starts) {
-    const bool varies_step = starts.varies(VariedName::Role::step, 0);
-    for (const SweepStarts::Column& column : starts.columns()) {
-        if (column.of.role != VariedName::Role::parameter) continue;
-        const Parameter& parameter = scene.parameters[column.of.index];
-        const bool has_step = !varies_step && scene.run.step.has(parameter.symbol),
-                   has_end = scene.run.until.has(parameter.symbol);
-        if (has_step || has_end)
-            tell("lobatto: warning: {} for all trajectories {} of {} = {:.6g}.\n",
-                 has_step && has_end ? "the step and the end time"
-                 : has_step          ? "the step"
-                                     : "the end time",
-                 has_step && has_end ? "are those" : "is that", parameter.written,
-                 scene.evaluate(parameter.value, parameter.name).to_double());
-    }
-}
-
 // A row for each setting: a study of convergence.
 void print_settings(const SweepStudy& study, const SweepTally& tally) {
     const SweepStarts& starts = study.starts();
@@ -150,8 +132,9 @@ std::string failures_text(const SweepStudy& study, const SweepTally& tally) {
             reasons.push_back(fmt::format("{} {}", count, sweep_statuses[status]));
     const std::vector<SweepFigures>& first = tally.first_failures();
     std::string text =
-        fmt::format("{}: {} of {} failed: {}. The others went on. {}:", study.scene().path, tally.failed(),
+        fmt::format("{}: {} of {} failed: {}.{} {}:", study.scene().path, tally.failed(),
                     counted(tally.trajectories(), "trajectory", "trajectories"), fmt::join(reasons, ", "),
+                    tally.failed() < tally.trajectories() ? " The others went on." : "",
                     tally.failed() > std::ssize(first) ? "The first of them" : "They are");
     for (const SweepFigures& failure : first) {
         text += fmt::format("\n  trajectory {}, {}: {}", failure.index, study.starts().text_of(failure.index),
@@ -171,16 +154,6 @@ std::string failures_text(const SweepStudy& study, const SweepTally& tally) {
     if (some({unresolved})) advice += "--beyond-horizon for the statistics of chaos, ";
     if (some({unresolved, LOBATTO_IMPACTS_ACCUMULATE})) advice += "an earlier end, ";
     return text + (advice.empty() ? "\nLeave these values out." : "\nTry " + advice + "or leave these values out.");
-}
-
-void warn_of_errors(const SweepStudy& study, const SweepTally& tally) {
-    warn_of_fixed_times(study.scene(), study.starts());
-    const Worst worst = tally.worst_error();
-    if (worst.index >= 0 && worst.value > large_error)
-        tell(
-            "lobatto: warning: the error of trajectory {}, {}, is {:.2g} of the amplitude; take a smaller step, or "
-            "more points.\n",
-            worst.index, study.starts().text_of(worst.index), worst.value);
 }
 
 namespace {

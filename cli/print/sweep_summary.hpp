@@ -20,9 +20,6 @@ void print_sweep_notes(const SweepStudy& study);
 // How many failed, why, and the first of them with their values.
 std::string failures_text(const SweepStudy& study, const SweepTally& tally);
 
-// Warns of the worst error where it is large.
-void warn_of_errors(const SweepStudy& study, const SweepTally& tally);
-
 // For machines: one line of JSON (docs/schemas/sweep.json).
 struct SweptTable {
     std::int64_t asked;  // trajectories that were to be computed

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "generator/formula/parser.hpp"
 #include "generator/formula/text/suggest.hpp"
@@ -98,6 +99,14 @@ void Parser::refuse_emptiness() const {
                                   right.substr(0, 40)));
     if (find(right) == nullptr && (right == "and" || right == "or" || right == "not"))
         fail(token(), fmt::format("there is no '{}' in formulas: write one if inside another", right));
+    static constexpr std::array units{"m",  "s",  "kg",  "N",  "rad", "deg", "Hz", "mm",      "cm",
+                                      "km", "ms", "min", "Nm", "J",   "W",   "Pa", "degrees", "seconds"};
+    if (tokens_[next_ - 1].kind == Token::Kind::number && find(right) == nullptr &&
+        std::find(units.begin(), units.end(), right) != units.end())
+        fail(token(), right.starts_with("deg")
+                          ? fmt::format("angles are in radians: write {}*pi/180", left)
+                          : fmt::format("numbers have no units: leave '{0}' out, or write {1}*{0} for a parameter {0}",
+                                        right, left));
     fail(token(), fmt::format("missing operator: write {}*{}", left.substr(0, 40), right.substr(0, 40)));
 }
 

@@ -232,11 +232,17 @@ private:
         for (const auto& [place, value] : system_.momentum_v.entries()) held += GiNaC::pow(value, 2);
         const bool everywhere =
             std::none_of(system_.q.begin(), system_.q.end(), [&](const auto& q) { return held.has(q); });
+        std::string zeros;  // parameters that may be the reason
+        for (const Parameter& parameter : scene_.parameters)
+            if (held.has(parameter.symbol) && zerop(start_.get(parameter.symbol)))
+                zeros += (zeros.empty() ? ", or give a value other than 0 to " : " or ") + parameter.written;
         refuse(fmt::format("the mass matrix is singular at the start, {}: no kinetic energy opposes the direction {}{}",
                            values_in(held, system_, start_), direction_text(system_, elimination.vector),
-                           everywhere ? "; give it mass, or remove a coordinate"
-                                      : " there; start elsewhere, or choose coordinates that are regular there (x and "
-                                        "y instead of an angle at its pole)"));
+                           everywhere
+                               ? "; give it mass, or remove a coordinate"
+                               : fmt::format(" there; start elsewhere, {}choose coordinates that are regular there (x "
+                                             "and y instead of an angle at its pole){}",
+                                             zeros.empty() ? "or " : "", zeros)));
     }
 
     // p(v) + G^T mu - p0, then G v + dphi/dt, and the sum of the squares; of a velocity, and mu after it.

@@ -42,7 +42,7 @@ def _coordinate(name, value):
 
 
 def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=None, output=None, inputs=(),
-               definitions=None, extra="", **variables):
+               definitions=None, forces=None, extra="", **variables):
     """A scene from a Lagrangian and the values of its names.
 
     A name that stands in the Lagrangian with a prime, as q in ``m*q'^2/2``, is a coordinate. Its value is its initial
@@ -54,16 +54,20 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
     ``time``: its name where it stands in the Lagrangian or a force, such as "t". ``method``: a table such as
     ``dict(points=6)`` or ``dict(stages=4, clock="auto")``. ``output``: as [output] in a scene file. ``inputs``: names of
     parameters that ``Stepper.set`` may change before each step. ``definitions``: names of formulas, such as
-    ``{"r": "sqrt(x^2 + y^2)", "V[i]": "x[i]^4"}``. ``extra``: more of a scene file, as text; ``Scene.from_text`` takes a whole one.
+    ``{"r": "sqrt(x^2 + y^2)", "V[i]": "x[i]^4"}``. ``forces``: on coordinates or along definitions, such as
+    ``{"r": "-k*r"}``. ``extra``: more of a scene file, as text; ``Scene.from_text`` takes a whole one.
     """
     if not isinstance(lagrangian, str):
         raise InputError(f"the Lagrangian is a text, such as \"m*q'^2/2 - k*q^2/2\", not {lagrangian!r}")
-    examples = {"method": "points=4", "output": "every=10", "definitions": "r='sqrt(x^2 + y^2)'"}
-    for name, table in ("method", method), ("output", output), ("definitions", definitions):
+    examples = {"method": "points=4", "output": "every=10", "definitions": "r='sqrt(x^2 + y^2)'", "forces": "x=\"-c*x'\""}
+    for name, table in ("method", method), ("output", output), ("definitions", definitions), ("forces", forces):
         if table is not None and not hasattr(table, "items"):
             raise InputError(f"{name} is a table, such as {name}=dict({examples[name]}), "
                              f"not {table!r}")
     formulas = [lagrangian, *(str(formula) for formula in (definitions or {}).values())]
+    foreign = re.search(r"[^\W\d_a-zA-Z]\w*", re.sub(r'"[^"]*"|#[^\n]*', "", "\n".join(formulas)))
+    if foreign:
+        raise InputError(f"'{foreign.group()}' is no name: names have the letters a to z, digits and _, as theta' has")
     moving = {name for formula in formulas
               for name in re.findall(r"([A-Za-z_]\w*)(?:\[[^\]]*\])?'", re.sub("#[^\n]*", "", formula))}  # no comments
     moving -= set(definitions or {})
@@ -90,11 +94,11 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
     if definitions:
         lines.append("[definitions]")
         lines += [f"{_value(name)} = {_value(value)}" for name, value in definitions.items()]  # V[i] needs quotes
-    forces = {name: table.pop("force") for name, table in coordinates.items() if "force" in table}
+    forces = {**{name: table.pop("force") for name, table in coordinates.items() if "force" in table}, **(forces or {})}
     for heading, table in ("coordinates", coordinates), ("forces", forces):
         if table:
             lines.append(f"[{heading}]")
-            lines += [f"{name} = {_value(value)}" for name, value in table.items()]
+            lines += [f"{_value(name)} = {_value(value)}" for name, value in table.items()]
     if isinstance(inputs, str):
         raise InputError(f"inputs is a list of names: inputs=[{inputs!r}]")
     inputs = list(inputs)

@@ -188,7 +188,8 @@ class Sweep(_Rows):
         return States(self.coordinates, self._states, slice(int(first[index]), int(first[index + 1])))
 
     def __repr__(self):
-        return f"Sweep({len(self)} trajectories, {int(self.ok.sum())} reached their end)"
+        cut = ", interrupted before the others" if self.interrupted else ""
+        return f"Sweep({len(self)} trajectories, {int(self.ok.sum())} reached their end{cut})"
 
 
 class Choice:

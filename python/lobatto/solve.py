@@ -33,6 +33,8 @@ def run(scene, *, measure=True, companion="", beyond_horizon=False, progress=Non
         raise
     for warning in values["warnings"]:
         warnings.warn(warning, stacklevel=2)
+    if not values["reaches_end"]:
+        warnings.warn(f"the end time is not a multiple of the step: the run ends at t = {values['t'][-1]:g}", stacklevel=2)
     return Trajectory(scene, settings, values)
 
 

@@ -46,13 +46,13 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
         case LOBATTO_NOT_CONVERGED:
             why = fmt::format(
                 "the iteration for the positions inside the step did not converge{}. The step is too long for the "
-                "forces met there, or the motion runs into a singularity of the potential, or to a place where a mass "
-                "vanishes",
+                "forces met there, or the motion runs into a singularity of the potential, to a place where a mass "
+                "vanishes, or away to infinity",
                 result.increment_failed > 0 ? fmt::format(": its last increment was {:.2g} of the displacement within "
                                                           "the step",
                                                           result.increment_failed)
                                             : std::string());
-            advice = smaller + more + ", or start elsewhere";
+            advice = smaller + more + ", an earlier end, or start elsewhere";
             break;
         case LOBATTO_NOT_FINITE:
             if (!result.started) {

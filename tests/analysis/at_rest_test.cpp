@@ -264,5 +264,9 @@ TEST_CASE("an equilibrium is no motion that is lost, wherever it is") {
         "lagrangian = \"(x'^2 + y'^2)/2 + (y - x - 1)^2/2\"\n[coordinates]\nx = { position = 0, velocity = 0 }\n"
         "y = { position = 1, velocity = 0 }\n" +
         rest);
-    CHECK(unstable.run({"--until", "100"}).exit_code == 3);
+    const test::Finished left = unstable.run({"--until", "100"});
+    CHECK(left.exit_code == 3);
+    CHECK(test::contains(left.err,
+                         "the run rests where it begins, q = (0, 1), p = (0, 0): this equilibrium is unstable"));
+    CHECK(test::contains(left.out, "  measured error          not known: the run rests in an unstable equilibrium\n"));
 }

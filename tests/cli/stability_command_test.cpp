@@ -130,6 +130,17 @@ TEST_CASE("a step beyond the first limit somewhere along a motion is named") {
     CHECK(test::contains(done.out, "BEYOND the first limit, 1.06 times"));
 }
 
+TEST_CASE("places to which a step throws the motion tell nothing of it") {
+    const test::TemporaryFolder folder;
+    const std::string path = scene_in(folder, "r'^2/200 + q'^2/10 - 1e6*(r - q)^2/2 + 4*cos(q)",
+                                      "r = { position = 0.5, velocity = 0 }\nq = { position = 0.5, velocity = 0 }");
+    const test::Finished done = stability({path, "--step", "0.005"});
+    CHECK(done.exit_code == 0);
+    CHECK(test::contains(done.out, "About the equilibrium r = 0, q = 0, h = 0.005:"));
+    CHECK(done.out.find("e+") == std::string::npos);  // once: equilibria at 1e18, with the rounding of cos there
+    CHECK(test::contains(done.out, "the motion itself 1"));
+}
+
 TEST_CASE("velocities that couple, time, singular places and no equilibrium are each said in words") {
     const test::TemporaryFolder folder;
     const std::string two = "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }";

@@ -169,6 +169,59 @@ TEST_CASE("a rod is as long as the input says at the end of every step") {
     CHECK(std::fabs(winch.q()[0] - 0.6) > 0.5);
 }
 
+// A pendulum of length 1 whose pivot goes 0.3 (1 - cos 6t): a'' = -g sin a - pivot'' cos a, by Runge and Kutta's
+// method.
+TEST_CASE("constraints and definitions that move with an input need its speed") {
+    const auto pivot = [](double t) { return 0.3 * (1 - std::cos(6 * t)); };
+    const auto bend = [](double t, double a) { return -9.81 * std::sin(a) - 10.8 * std::cos(6 * t) * std::cos(a); };
+    double a = std::acos(-1.0) / 4, v = 0;
+    const double s = 1e-4;
+    for (int i = 0; i < 10000; ++i) {
+        const double t = i * s, k1 = bend(t, a), k2 = bend(t + s / 2, a + s / 2 * v),
+                     k3 = bend(t + s / 2, a + s / 2 * v + s * s / 4 * k1), k4 = bend(t + s, a + s * v + s * s / 2 * k2);
+        a += s * v + s * s / 6 * (k1 + k2 + k3);
+        v += s / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+    }
+    const double place = pivot(1) + std::sin(a);
+    const std::string
+        run = "[inputs]\nu = 0\nw = 0\nt0 = 0\n[run]\nuntil = 1\nstep = ",
+        plane =
+            "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 - 9.81*y\"\n[coordinates]\n"
+            "x = { position = \"sqrt(1/2)\", velocity = 0 }\ny = { position = \"-sqrt(1/2)\", velocity = 0 }\n",
+        rod = plane + "[constraints]\nrod = \"(x - u - w*(t - t0))^2 + y^2 = 1\"\n" + run,
+        jumps = plane + "[constraints]\nrod = \"(x - u + 0*w*t0)^2 + y^2 = 1\"\n" + run,
+        angle =
+            "time = \"t\"\nlagrangian = \"(x'^2 + y'^2)/2 - 9.81*y\"\n[coordinates]\n"
+            "a = { position = \"pi/4\", velocity = 0 }\n[definitions]\nx = \"u + w*(t - t0) + sin(a)\"\n"
+            "y = \"-cos(a)\"\n" +
+            run;
+    const auto error = [&](const std::string& text, int steps, bool is_angle) {
+        const double h = 1.0 / steps;
+        lob::Stepper stepper = stepper_of(text + std::to_string(h) + "\n");
+        for (int i = 0; i < steps; ++i) {
+            const double values[] = {pivot(i * h + (text == jumps ? h : 0)), (pivot(i * h + h) - pivot(i * h)) / h,
+                                     i * h};
+            stepper.set_inputs(values);
+            stepper.step();
+        }
+        const double q = stepper.q()[0];
+        return std::fabs((is_angle ? pivot(1) + std::sin(q) : q) - place);
+    };
+    for (const bool is_angle : {false, true}) {
+        const std::string& text = is_angle ? angle : rod;
+        CHECK(error(text, 200, is_angle) < 3e-5);
+        CHECK(error(text, 100, is_angle) / error(text, 200, is_angle) == doctest::Approx(4).epsilon(0.05));  // order 2
+    }
+    CHECK(error(jumps, 200, false) > 0.01);  // whatever the step
+    CHECK(error(jumps, 1000, false) > 0.01);
+    std::string shifted = angle;
+    shifted.replace(shifted.find(" + w*(t - t0)"), 13, "");
+    shifted.replace(shifted.find("- 9.81*y"), 8, "- 9.81*y + 0*w*t0");
+    CHECK(error_of(shifted + "0.01") ==
+          "inputs.toml:9:1: input u moves nothing: it is constant within a step, so x' does not hold it. Write u + "
+          "u_speed*(t - u_time) in its place, with these three as inputs");
+}
+
 TEST_CASE("an input that is set acts as a parameter does, for which the kernel is prepared anew") {
     const std::string arm = LOBATTO_SOURCE_DIR "/examples/cmake/arm.toml";
     const lob::Scene scene(arm);

@@ -37,6 +37,12 @@ def test_a_run_is_that_of_the_command_line(pendulum, tmp_path):
     assert run.units == ["rad"] and run.names == ["q"]
 
 
+def test_forces_act_along_definitions():
+    scene = lobatto.Lagrangian("(x'^2 + y'^2)/2", x=(1, 0), y=dict(position=2, velocity=0, force="-0*y"),
+                               definitions={"r": "sqrt(x^2 + y^2)"}, forces={"r": "-r"}, step=0.1, until=1)
+    assert numpy.allclose(lobatto.run(scene).q[-1], [numpy.cos(1), 2 * numpy.cos(1)], rtol=1e-8)
+
+
 def test_a_lagrangian_written_in_python_is_the_scene_of_the_same_text(pendulum):
     scene = lobatto.Lagrangian("m*q'^2/2 - m*omega^2*(1 - cos(q))", q=dict(position="pi/2", velocity=0, unit="rad"),
                                m=1, omega="2*pi", step=0.05, until=5, method=dict(points=4))
@@ -166,7 +172,38 @@ def test_an_exception_of_the_caller_ends_the_work_and_arrives(pendulum):
             work()
     short = lobatto.run(pendulum, until=1e6, measure=False, progress=lambda share: False)
     assert short.interrupted and short.t[-1] < 1e6 and "interrupted" in repr(short)
-    assert not lobatto.run(pendulum, until=1.03).reaches_end
+    with pytest.warns(UserWarning, match="not a multiple of the step: the run ends at t = 1"):
+        assert not lobatto.run(pendulum, until=1.03).reaches_end
+    cut = lobatto.sweep(pendulum, {"q": numpy.linspace(0, 1, 2000)}, until=1e4, progress=lambda share: share < 0.1)
+    assert cut.interrupted and "interrupted" in repr(cut)
+
+
+def test_sweeps_warn_as_the_command_does(pendulum):
+    with pytest.warns(UserWarning) as warned:
+        sweep = lobatto.sweep(pendulum, {"q": [0.5, 3.1]}, step=0.3, until=20, points=2)
+    told = [str(warning.message) for warning in warned]
+    assert told == sweep.warnings and len(told) == 2
+    assert told[0].startswith("the error of trajectory 1, q = 3.1, is ")
+    assert told[1].startswith("the end time is not a multiple of the step")
+
+
+def test_a_stepper_belongs_to_one_thread(pendulum):
+    stepper, refused = lobatto.Stepper(pendulum), []
+
+    def advance():
+        try:
+            stepper.advance(3_000_000)
+        except lobatto.InputError as error:
+            refused.append(str(error))
+
+    threads = [threading.Thread(target=advance) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    advanced = round(stepper.t / stepper.step_size)
+    assert advanced == 3_000_000 * (4 - len(refused))
+    assert all("in another thread; give each thread its own" in text for text in refused)
 
 
 def test_arrays_are_not_copied_and_outlive_what_made_them(pendulum):
@@ -343,6 +380,9 @@ def test_ctrl_c_ends_verify():
 def test_wrong_types_are_wrong_input():
     oscillator = lobatto.Lagrangian("q'^2/2 - q^2/2", q=1, until=1)
     for wrong, match in ((lambda: lobatto.Lagrangian("q'^2/2", q=1, method="gauss"), "method is a table"),
+                         (lambda: lobatto.Lagrangian("φ'^2/2", φ=1), "'φ' is no name"),
+                         (lambda: lobatto.Scene("lagrangian = 1\nstep = 1"), "write Scene.from_text"),
+                         (lambda: lobatto.run(oscillator, until=1e10), "10 states of the run would need"),
                          (lambda: lobatto.Lagrangian(b"q'^2/2", q=1), "the Lagrangian is a text"),
                          (lambda: lobatto.Lagrangian("q'^2/2 + push*q", q=1, push=0, inputs="push"), "a list of names"),
                          (lambda: lobatto.sweep(oscillator, (x for x in [1, 2])), "columns with their names"),

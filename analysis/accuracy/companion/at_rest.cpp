@@ -23,14 +23,15 @@ bool stays_within(double part, const std::vector<double>& start, const std::vect
         if (!(most[i] - least[i] <= part * (start[i] != 0 ? std::fabs(start[i]) : farthest))) return false;
     return true;
 }
+
+}  // namespace
+
 // Momenta, too: positions far from 0 may be too coarse to move.
 bool rests(const std::vector<double>& start, const std::vector<double>& least, const std::vector<double>& most,
            double epsilon) {
     return stays_within(few_roundings * epsilon, start, least, most, 0) &&
            stays_within(few_roundings * epsilon, start, least, most, start.size() / 2);
 }
-
-}  // namespace
 
 bool rests_beside_companion(const std::vector<double>& start, const std::vector<double>& least,
                             const std::vector<double>& most, const std::vector<double>& least_of_companion,

@@ -10,8 +10,11 @@
 namespace lobatto {
 
 // A motion whose positions and momenta stay where they begin but for rounding: of themselves, or of the farthest where
-// they begin at 0. Its companion, which begins beside it, stays near, too. Such a motion has no amplitude.
-// start, least, most: of q, then p.
+// they begin at 0. start, least, most: of q, then p.
+bool rests(const std::vector<double>& start, const std::vector<double>& least, const std::vector<double>& most,
+           double epsilon);
+
+// Such a motion, whose companion, which begins beside it, stays near, too. It has no amplitude.
 bool rests_beside_companion(const std::vector<double>& start, const std::vector<double>& least,
                             const std::vector<double>& most, const std::vector<double>& least_of_companion,
                             const std::vector<double>& most_of_companion, double epsilon);

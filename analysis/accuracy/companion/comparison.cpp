@@ -198,7 +198,9 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         error.lost_p = request_.p;
     }
     error.complete = count == run_.size();
-    error.doubling = doubling_of(course);
+    const std::vector<double> first = row_at(0);
+    error.rests = rests({first.begin() + 1, first.end()}, range_.least, range_.most, run_epsilon_);
+    if (!error.rests) error.doubling = doubling_of(course);  // else what grows are amplitudes, of the companion
     // Errors that grow exponentially do not shrink again: two motions that were out of step have met by chance.
     const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });
     if (!error.lost_after && error.doubling && large != course.end() && last.relative < worst.relative / 4) {

@@ -27,6 +27,7 @@ struct MeasuredError {
     std::vector<double> lost_q, lost_p;       // where the run was then
     std::optional<double> lost_after;         // from then on the error is as large as the motion
     std::optional<double> doubling;           // of errors that grow exponentially: the time in which they double
+    bool rests = false;                       // the run, while the companion may leave its place
     std::optional<double> companion_stopped;  // the time where the companion could not go on, though the run could
 
     bool is_lost() const { return lost_after.has_value(); }

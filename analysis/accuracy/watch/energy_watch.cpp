@@ -116,8 +116,9 @@ std::string why(const Scene& scene, double step, bool too_coarse) {
                "measure positions from a place nearer to the motion.";
     return fmt::format(
         "The step is too long for the method to be stable or for the forces met there, or it has gone past a "
-        "singularity of the potential. Try a smaller step, such as h = {:.6g}, an earlier end, or start elsewhere.",
-        step / 2);
+        "singularity of the potential{}. Try a smaller step, such as h = {:.6g}, an earlier end, or start elsewhere.",
+        scene.constraints.empty() ? "" : ", or past a place where constraints depend on one another (a dead point)",
+        scene.constraints.empty() ? step / 2 : 0.47 * step);
 }
 
 }  // namespace

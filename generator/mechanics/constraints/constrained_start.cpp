@@ -256,7 +256,8 @@ std::string ConstrainedStart::moved_text(const std::vector<GiNaC::symbol>& symbo
         const cln::cl_R value = start_.get(symbols[k]);
         if (cln::abs(value - before[k]) <= cln::abs(value) * power_of_ten(-30)) continue;
         if (++shown > 8) return text + ", ...";
-        text += fmt::format("{}{} = {}", shown == 1 ? "" : ", ", symbols[k].get_name(), decimal(value, 17));
+        text += fmt::format("{}{}{} = {}", shown == 1 ? "" : ", ", scene_.coordinates[k].written,
+                            &symbols == &system_.v ? "'" : "", decimal(value, 17));
     }
     return text;
 }
@@ -264,8 +265,9 @@ std::string ConstrainedStart::moved_text(const std::vector<GiNaC::symbol>& symbo
 void ConstrainedStart::refuse(std::size_t constraint, const std::string& what, const std::string& nearest) const {
     const Constraint& of = system_.constraints[constraint];
     scene_.source.fail(of.at, fmt::format("the start does not keep the constraint {} ({}): {}; the nearest start that "
-                                          "keeps all constraints has {}: write that, or add assemble = true to [run]",
-                                          of.written, of.text, what, nearest));
+                                          "keeps all constraints has {}: {}, or add assemble = true to [run]",
+                                          of.written, of.text, what, nearest,
+                                          scene_.bodies.empty() ? "write that" : "bring bodies and joints there"));
 }
 
 void ConstrainedStart::refuse_unreachable(std::size_t constraint) const {

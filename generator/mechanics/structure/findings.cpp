@@ -114,8 +114,22 @@ std::vector<Finding> scene_findings(const Scene& scene, const System& system) {
     if (!system.inputs.empty()) {
         std::string list;
         for (const GiNaC::symbol& input : system.inputs) list += (list.empty() ? "" : ", ") + input.get_name();
+        const auto holds_input = [&](const GiNaC::ex& formula) {
+            return std::any_of(system.inputs.begin(), system.inputs.end(),
+                               [&](const GiNaC::symbol& input) { return formula.has(input); });
+        };
+        const bool moves_constraint =
+            std::any_of(scene.constraints.begin(), scene.constraints.end(),
+                        [&](const Constraint& constraint) { return holds_input(constraint.value); });
+        const bool moves_wall = std::any_of(scene.impacts.begin(), scene.impacts.end(),
+                                            [&](const Impact& impact) { return holds_input(impact.when.value); });
         find("inputs", true,
-             list + ": a program may change them before each step with set_inputs(); the energy changes with them");
+             list + ": a program may change them before each step with set_inputs(); the energy changes with them" +
+                 (moves_constraint || moves_wall
+                      ? fmt::format("; a {} jumps with its input and has no speed: for one that moves, write u + "
+                                    "u_speed*(t - u_time), three inputs",
+                                    moves_constraint ? "constraint" : "wall")
+                      : ""));
     }
     add_measured_values(system, findings);
     if (!scene.constants.empty()) {

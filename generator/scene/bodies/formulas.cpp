@@ -315,7 +315,8 @@ void SystemReader::Bodies::add_equations(const JointLine& line) {
         constraint.at = joint.at;
         reader_.scene_.constraints.push_back(constraint);
     }
-    reader_.require_freedom(joint.at, second.plane ? ""
+    reader_.require_freedom(joint.at, second.plane ? ", or they depend on one another, as those of a third parallel "
+                                                     "crank do: leave out a joint that the others keep"
                                                    : ", or they depend on one another, as those of hinges with "
                                                      "parallel axes do; write plane bodies, or leave out a joint");
 }

@@ -426,6 +426,8 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
     REQUIRE(starts.rows.size() == 3);
     CHECK(test::column_of(starts, "status") == std::vector<double>{0, 4, 2});
     CHECK(std::isnan(test::column_of(starts, "x")[2]));
+    const test::Finished all = place.sweep({scene, "--vary", "m=-2,-1"});
+    CHECK(test::contains(all.err, ": 2 of 2 trajectories failed: 2 not finite. They are:\n"));
 }
 
 TEST_CASE("trajectories that leave their Lagrangian are told from those that stay, also where no energy is asked for" *

@@ -74,6 +74,12 @@ TEST_CASE("a start where the mass matrix is singular is refused with the directi
     CHECK(refusal("m*x'^2/2 - x^2", at_origin, "m = 0\n") ==
           "scene.toml:2:15: the mass matrix is singular at the start, m = 0: no kinetic energy opposes the direction "
           "x' = 1; give it mass, or remove a coordinate");
+    CHECK(
+        refusal("m*x'^2/2 + x^2*y'^2/2 - x^2",
+                "x = { position = 1, velocity = 0 }\ny = { position = 0, velocity = 1 }\n", "m = 0\n") ==
+        "scene.toml:2:15: the mass matrix is singular at the start, x = 1: no kinetic energy opposes the direction x' "
+        "= 1 there; start elsewhere, choose coordinates that are regular there (x and y instead of an angle at its "
+        "pole), or give a value other than 0 to m");
 }
 
 TEST_CASE("a momentum that no velocity has is refused where it is given") {
