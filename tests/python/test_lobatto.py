@@ -180,10 +180,10 @@ def test_an_exception_of_the_caller_ends_the_work_and_arrives(pendulum):
 
 def test_sweeps_warn_as_the_command_does(pendulum):
     with pytest.warns(UserWarning) as warned:
-        sweep = lobatto.sweep(pendulum, {"q": [0.5, 3.1]}, step=0.3, until=20, points=2)
+        sweep = lobatto.sweep(pendulum, {"q": [0.5, 1.0]}, step=0.03, until=5, points=2)
     told = [str(warning.message) for warning in warned]
     assert told == sweep.warnings and len(told) == 2
-    assert told[0].startswith("the error of trajectory 1, q = 3.1, is ")
+    assert told[0].startswith("the error of trajectory 1, q = 1, is ")
     assert told[1].startswith("the end time is not a multiple of the step")
 
 
@@ -382,7 +382,7 @@ def test_wrong_types_are_wrong_input():
     for wrong, match in ((lambda: lobatto.Lagrangian("q'^2/2", q=1, method="gauss"), "method is a table"),
                          (lambda: lobatto.Lagrangian("φ'^2/2", φ=1), "'φ' is no name"),
                          (lambda: lobatto.Scene("lagrangian = 1\nstep = 1"), "write Scene.from_text"),
-                         (lambda: lobatto.run(oscillator, until=1e10), "10 states of the run would need"),
+                         (lambda: lobatto.run(oscillator, until=1e10), "states of the run would need"),
                          (lambda: lobatto.Lagrangian(b"q'^2/2", q=1), "the Lagrangian is a text"),
                          (lambda: lobatto.Lagrangian("q'^2/2 + push*q", q=1, push=0, inputs="push"), "a list of names"),
                          (lambda: lobatto.sweep(oscillator, (x for x in [1, 2])), "columns with their names"),
