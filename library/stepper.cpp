@@ -116,6 +116,15 @@ struct Stepper::Parts {
     std::size_t n() const { return q.size(); }
     std::size_t columns() const { return 2 + 2 * static_cast<std::size_t>(stepper.kernel()->coordinates); }
 
+    void require_finite(double t, const double* q, const char* position, const double* rate, const char* what) const {
+        if (!std::isfinite(t)) throw lobatto::InputError(fmt::format("start: {} is no time", t));
+        for (const auto& [values, of] : {std::pair(q, position), std::pair(rate, what)})
+            for (std::size_t k = 0; k < n(); ++k)
+                if (!std::isfinite(values[k]))
+                    throw lobatto::InputError(fmt::format("start: {} {} is {}, not a finite number", of,
+                                                          kernel.parts().coordinates[k].name, values[k]));
+    }
+
     // What to say of a step or a start that failed; with a clock, where its chain of steps was.
     [[noreturn]] void fail(lobatto_status status, const lobatto_advance& call) const {
         TrajectoryRequest request = kernel.parts().start;
@@ -359,11 +368,15 @@ double Stepper::step_size() const {
 
 void Stepper::start(double t, const double* q, const double* p) {
     const std::size_t n = parts_->n();
-    guarded([&] { parts_->begin_at(t, {q, q + n}, {p, p + n}); });
+    guarded([&] {
+        parts_->require_finite(t, q, "the position of", p, "the momentum of");
+        parts_->begin_at(t, {q, q + n}, {p, p + n});
+    });
 }
 void Stepper::start_from_velocity(double t, const double* q, const double* v) {
     const std::size_t n = parts_->n();
     guarded([&] {
+        parts_->require_finite(t, q, "the position of", v, "the velocity of");
         const std::vector<double> position{q, q + n};
         parts_->begin_at(t, position, momentum_of_start(parts_->stepper, t, position, {v, v + n}));
     });

@@ -232,6 +232,14 @@ TEST_CASE("errors of the library have the command line's texts and exit codes") 
         CHECK(std::string(failure.what()).find("did not converge") != std::string::npos);
         CHECK(failure.trajectory().count >= 2);  // what was computed is there
     }
+    lob::Stepper stepper(lob::compile(lob::Scene(scenes + "pendulum.toml")));
+    const double nothing = std::nan(""), one = 1;
+    CHECK(lobatto::test::message_of<lob::InputError>([&] { stepper.start(0, &nothing, &one); }) ==
+          "start: the position of q is nan, not a finite number");
+    CHECK(lobatto::test::message_of<lob::InputError>([&] { stepper.start_from_velocity(0, &one, &nothing); }) ==
+          "start: the velocity of q is nan, not a finite number");
+    CHECK(lobatto::test::message_of<lob::InputError>([&] { stepper.start(nothing, &one, &one); }) ==
+          "start: nan is no time");
 }
 
 TEST_CASE("a stepper whose step fails stays where it was") {
