@@ -145,6 +145,21 @@ bool advance_to(lob::Stepper& stepper, double t) {
     return unlocked([&] { return stepper.advance_to(t); });
 }
 
+void start(lob::Stepper& stepper, double t, const py::object& q, const py::object& p, const py::object& velocity) {
+    if (p.is_none() == velocity.is_none()) throw lob::InputError("start: give p or velocity, one of them");
+    const std::size_t n = stepper.coordinates();
+    const Array position = whole(q, "q"), rate = p.is_none() ? whole(velocity, "velocity") : whole(p, "p");
+    if (p.is_none())
+        stepper.start_from_velocity(t, row_of(position, n, "q"), row_of(rate, n, "velocity"));
+    else
+        stepper.start(t, row_of(position, n, "q"), row_of(rate, n, "p"));
+}
+template <class Function, class... Arguments>
+auto alone(lob::Stepper& stepper, Function function, const Arguments&... arguments) {
+    const InUse in_use(stepper);
+    return std::invoke(function, stepper, arguments...);
+}
+
 // What the last holder of a scene destroys are formulas, too.
 struct Freed {
     template <class T>
@@ -382,37 +397,18 @@ void add_stepper(py::module_& module) {
              }),
              py::arg("scene"))
         .def(
-            "step",
-            [](lob::Stepper& stepper) {
-                const InUse in_use(stepper);
-                return stepper.step();
-            },
+            "step", [](lob::Stepper& stepper) { return alone(stepper, &lob::Stepper::step); },
             "One step. False where a stop of the scene ended the motion.")
         .def(
-            "advance",
-            [](lob::Stepper& stepper, std::int64_t steps) {
-                const InUse in_use(stepper);
-                return advance(stepper, steps);
-            },
+            "advance", [](lob::Stepper& stepper, std::int64_t steps) { return alone(stepper, &advance, steps); },
             py::arg("steps"), "So many steps. False where a stop ended the motion.")
         .def(
-            "advance_to",
-            [](lob::Stepper& stepper, double t) {
-                const InUse in_use(stepper);
-                return advance_to(stepper, t);
-            },
-            py::arg("t"), "Equal steps while they fit, then a shorter one that ends at t exactly.")
+            "advance_to", [](lob::Stepper& stepper, double t) { return alone(stepper, &advance_to, t); }, py::arg("t"),
+            "Equal steps while they fit, then a shorter one that ends at t exactly.")
         .def(
             "start",
             [](lob::Stepper& stepper, double t, const py::object& q, const py::object& p, const py::object& velocity) {
-                if (p.is_none() == velocity.is_none()) throw lob::InputError("start: give p or velocity, one of them");
-                const InUse in_use(stepper);
-                const std::size_t n = stepper.coordinates();
-                const Array position = whole(q, "q"), rate = p.is_none() ? whole(velocity, "velocity") : whole(p, "p");
-                if (p.is_none())
-                    stepper.start_from_velocity(t, row_of(position, n, "q"), row_of(rate, n, "velocity"));
-                else
-                    stepper.start(t, row_of(position, n, "q"), row_of(rate, n, "p"));
+                alone(stepper, &start, t, q, p, velocity);
             },
             py::arg("t"), py::arg("q"), py::arg("p") = py::none(), py::kw_only(), py::arg("velocity") = py::none(),
             "Another place to go on from: positions, and momenta or velocities.")

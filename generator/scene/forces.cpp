@@ -52,8 +52,8 @@ void SystemReader::read_forces() {
     }
 }
 
-// By virtual work: what moves r by dr moves the coordinates by dq, so the force on q_k is F dr/dq_k. Of a rate w, F w
-// is its power, and the force on q_k is F dw/dq_k'.
+// (D66) By virtual work: what moves r by dr moves the coordinates by dq, so the force on q_k is F dr/dq_k. Of a rate w,
+// F w is its power, and the force on q_k is F dw/dq_k'.
 void SystemReader::add_force_along(const Subject& subject, const Entry& entry, const Scope& scope) {
     const std::string name(subject.name.text);
     if (!subject.indices.empty())

@@ -94,12 +94,10 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
         case LOBATTO_IMPACTS_ACCUMULATE:
             why =
                 "impacts accumulate within this step: more than 100 of them, or nearer to one another than can be told "
-                "apart. The motion comes to rest on a wall, slides along it, is held fast by friction, or a reset "
-                "leaves it on its way through the wall; none of these is computed";
-            advice =
-                "an end before that time, a stop under [run] where the motion has become slow, for friction "
-                "tanh(v/w) with a small velocity w in place of sign(v), or " +
-                smaller + " where many impacts belong into a step";
+                "apart. The motion comes to rest on a wall, slides along it, is held fast by friction (where tanh(v/w) "
+                "goes on, not sign(v)), or a reset leaves it on its way through the wall; none of these is computed";
+            advice = "an end before that time, a stop under [run] where the motion has become slow, or " + smaller +
+                     " where many impacts belong into a step";
             break;
         case LOBATTO_TIME_STANDS_STILL:
             if (request.arrivals.interval != 0) {
