@@ -34,6 +34,11 @@ const api::Variable* parameter_of(const lobatto_scene* scene, std::size_t index)
     return api::read(scene, nullptr, [&](const auto& value) { return api::element(value.parameters(), index); });
 }
 
+// What a caller gives, or a place for what is asked for.
+void require(const void* pointer, const char* name) {
+    if (pointer == nullptr) throw api::InputError(fmt::format("{}: NULL was given", name));
+}
+
 template <class Work>
 int with_stepper(lobatto_integrator* integrator, Work&& work) noexcept {
     if (integrator == nullptr || !integrator->value) return api::status_of(integrator);
@@ -140,11 +145,19 @@ const char* lobatto_integrator_message(const lobatto_integrator* integrator) {
     return api::message_of(integrator);
 }
 int lobatto_integrator_start(lobatto_integrator* integrator, double t, const double* q, const double* p) {
-    return with_stepper(integrator, [&](api::Stepper& stepper) { stepper.start(t, q, p); });
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(q, "q");
+        require(p, "p");
+        stepper.start(t, q, p);
+    });
 }
 int lobatto_integrator_start_from_velocity(lobatto_integrator* integrator, double t, const double* q,
                                            const double* velocity) {
-    return with_stepper(integrator, [&](api::Stepper& stepper) { stepper.start_from_velocity(t, q, velocity); });
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(q, "q");
+        require(velocity, "velocity");
+        stepper.start_from_velocity(t, q, velocity);
+    });
 }
 int lobatto_integrator_advance(lobatto_integrator* integrator, int64_t steps) {
     return with_stepper(integrator, [&](api::Stepper& stepper) { return stepper.advance(steps); });
@@ -153,8 +166,10 @@ int lobatto_integrator_advance_to(lobatto_integrator* integrator, double t) {
     return with_stepper(integrator, [&](api::Stepper& stepper) { return stepper.advance_to(t); });
 }
 int lobatto_integrator_set(lobatto_integrator* integrator, const char* parameter, double value) {
-    return with_stepper(integrator,
-                        [&](api::Stepper& stepper) { stepper.set(parameter == nullptr ? "" : parameter, value); });
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(parameter, "parameter");
+        stepper.set(parameter, value);
+    });
 }
 int lobatto_integrator_set_inputs(lobatto_integrator* integrator, const double* values) {
     return with_stepper(integrator, [&](api::Stepper& stepper) {
@@ -164,12 +179,15 @@ int lobatto_integrator_set_inputs(lobatto_integrator* integrator, const double* 
 }
 int lobatto_integrator_velocity(lobatto_integrator* integrator, double* velocity) {
     return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(velocity, "velocity");
         const std::vector<double> values = stepper.velocity();
         std::copy(values.begin(), values.end(), velocity);
     });
 }
 int lobatto_integrator_at(lobatto_integrator* integrator, double t, double* q, double* velocity) {
     return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(q, "q");
+        require(velocity, "velocity");
         const auto state = stepper.at(t);
         std::copy(state.first.begin(), state.first.end(), q);
         std::copy(state.second.begin(), state.second.end(), velocity);
@@ -177,18 +195,24 @@ int lobatto_integrator_at(lobatto_integrator* integrator, double t, double* q, d
 }
 int lobatto_integrator_tangent(lobatto_integrator* integrator, double* tangent) {
     return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(tangent, "tangent");
         const std::vector<double> values = stepper.tangent();
         std::copy(values.begin(), values.end(), tangent);
     });
 }
 int lobatto_integrator_parameter(lobatto_integrator* integrator, const char* parameter, double* value) {
-    return with_stepper(
-        integrator, [&](api::Stepper& stepper) { *value = stepper.parameter(parameter == nullptr ? "" : parameter); });
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(parameter, "parameter");
+        require(value, "value");
+        *value = stepper.parameter(parameter);
+    });
 }
 int lobatto_integrator_take_events(lobatto_integrator* integrator, const lobatto_event** events, size_t* count) {
-    *events = nullptr;
-    *count = 0;
+    if (events != nullptr) *events = nullptr;
+    if (count != nullptr) *count = 0;
     return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(events, "events");
+        require(count, "count");
         integrator->hits = stepper.take_events();
         integrator->events = events_of(integrator->hits);
         *events = api::data(integrator->events);
@@ -196,9 +220,11 @@ int lobatto_integrator_take_events(lobatto_integrator* integrator, const lobatto
     });
 }
 int lobatto_integrator_multipliers(lobatto_integrator* integrator, const double** multipliers, size_t* count) {
-    *multipliers = nullptr;
-    *count = 0;
+    if (multipliers != nullptr) *multipliers = nullptr;
+    if (count != nullptr) *count = 0;
     return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(multipliers, "multipliers");
+        require(count, "count");
         integrator->multipliers = stepper.multipliers();
         *multipliers = api::data(integrator->multipliers);
         *count = integrator->multipliers.size();
@@ -264,7 +290,8 @@ const double* lobatto_trajectory_energy(const lobatto_trajectory* trajectory) {
     return api::read(trajectory, nullptr, [](const auto& value) { return api::data(value.energy); });
 }
 const double* lobatto_trajectory_columns(const lobatto_trajectory* trajectory, size_t* columns) {
-    *columns = api::read(trajectory, 0, [](const auto& value) { return value.column_names.size(); });
+    if (columns != nullptr)
+        *columns = api::read(trajectory, 0, [](const auto& value) { return value.column_names.size(); });
     return api::read(trajectory, nullptr, [](const auto& value) { return api::data(value.columns); });
 }
 const char* lobatto_trajectory_column(const lobatto_trajectory* trajectory, size_t index) {
@@ -274,7 +301,7 @@ double lobatto_trajectory_error(const lobatto_trajectory* trajectory) {
     return api::read(trajectory, std::nan(""), [](const auto& value) { return value.error.value_or(std::nan("")); });
 }
 const lobatto_event* lobatto_trajectory_events(const lobatto_trajectory* trajectory, size_t* count) {
-    *count = trajectory == nullptr ? 0 : trajectory->events.size();
+    if (count != nullptr) *count = trajectory == nullptr ? 0 : trajectory->events.size();
     return trajectory == nullptr ? nullptr : api::data(trajectory->events);
 }
 size_t lobatto_trajectory_warnings(const lobatto_trajectory* trajectory) {
@@ -289,7 +316,13 @@ lobatto_sweep* lobatto_sweep_run(const lobatto_scene* scene, const lobatto_setti
     return api::made<lobatto_sweep>([&](lobatto_sweep& sweep) {
         api::Starts starts;
         starts.count = count;
+        if (columns > 0) {
+            require(names, "names");
+            require(values, "values");
+        }
         for (size_t c = 0; c < columns; ++c) {
+            require(names[c], "a name of names");
+            require(values[c], names[c]);
             if (starts.columns.contains(names[c]))
                 throw api::InputError(fmt::format("the column '{}' is given twice", names[c]));
             starts.columns[names[c]].assign(values[c], values[c] + count);

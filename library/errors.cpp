@@ -26,7 +26,8 @@ void rethrow() {
     } catch (const std::system_error& error) {
         throw MachineError(error.what());
     } catch (const std::bad_alloc&) {
-        throw MachineError("out of memory; keep fewer states (every), or take fewer trajectories or an earlier end");
+        throw MachineError(
+            "out of memory; states that are kept take most of it: keep fewer (every), or take fewer trajectories");
     } catch (const std::exception& error) {
         throw MachineError(std::string("internal error: ") + error.what() +
                            "\nThis is a mistake in Lobatto " LOBATTO_VERSION

@@ -78,12 +78,21 @@ const TrajectoryResult& OpenedRun::go(const Listeners& listeners) {
         if (parts_->observers->companion && std::thread::hardware_concurrency() > 1)
             parts_->observers->companion->start();
         parts_->result = integrate(parts_->prepared.kernel, parts_->request);
+        parts_->request.progress = {};  // the listeners may be gone from now on
         parts_->observers->watch.look_at_end(parts_->result);
         return parts_->result;
     });
 }
 
-RunVerdict OpenedRun::verdict() {
+RunVerdict OpenedRun::verdict(const std::function<bool()>& waits) {
+    RunObservers& observers = *parts_->observers;
+    if (observers.companion)
+        guarded([&] {  // others may work with formulas meanwhile
+            observers.error = observers.companion->finish(parts_->result, [&] {
+                observers.ended_by_caller = observers.ended_by_caller || (waits && !waits());
+                return !observers.ended_by_caller;
+            });
+        });
     return in_algebra([&] {
         return verdict_of(parts_->prepared, parts_->request, parts_->result, *parts_->observers, beyond_horizon_);
     });

@@ -40,8 +40,8 @@ public:
         const volatile int* interrupted = nullptr;         // not 0: the run ends
     };
     const TrajectoryResult& go(const Listeners& listeners);
-    // What is to be said of it, once it has ended.
-    RunVerdict verdict();
+    // What is to be said of it, once it has ended. waits: asked some times a second, whether to wait for its companion.
+    RunVerdict verdict(const std::function<bool()>& waits = {});
 
 private:
     struct Parts {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // A whole run, kept in memory and judged as `lobatto run` judges it.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "analysis/columns.hpp"
 #include "library/opened_run.hpp"
@@ -8,8 +9,6 @@
 namespace lobatto::api {
 
 namespace {
-
-constexpr double most_bytes = 16e9;  // bytes of states
 
 void append(std::vector<double>& all, const double* first, std::size_t count) {
     all.insert(all.end(), first, first + count);
@@ -65,15 +64,16 @@ Trajectory begun(const OpenedRun& run) {
     return trajectory;
 }
 
-// All states are kept in memory.
+// All states are kept in memory. Without stops, what they need is known.
 void refuse_too_much(const OpenedRun& run) {
     const TrajectoryRequest& request = run.request();
     const double states = static_cast<double>(request.steps) / static_cast<double>(request.every) * (1 + request.dense),
-                 memory = states * (2 + 2 * static_cast<double>(request.q.size())) * sizeof(double);
-    if (memory > most_bytes)
+                 memory = states * (2 + 2 * static_cast<double>(request.q.size())) * sizeof(double),
+                 there = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+    if (memory > there)
         throw lobatto::InputError(
-            fmt::format("--every: the {:.3g} states of the run would need {:.3g} GB of memory; give "
-                        "a larger number of steps between them",
+            fmt::format("every: the {:.3g} states of the run would need {:.3g} GB of memory; give a "
+                        "larger number of steps between them",
                         states, memory / 1e9));
 }
 
@@ -81,7 +81,7 @@ void refuse_too_much(const OpenedRun& run) {
 
 Trajectory run(const Scene& scene, const RunOptions& options) {
     OpenedRun run(scene, options);
-    guarded([&] { refuse_too_much(run); });
+    if (run.scene().run.stops.empty()) guarded([&] { refuse_too_much(run); });
     Trajectory trajectory = in_algebra([&] { return begun(run); });
     volatile int is_interrupted = 0;
     OpenedRun::Listeners listeners;
@@ -94,7 +94,10 @@ Trajectory run(const Scene& scene, const RunOptions& options) {
         };
     listeners.interrupted = &is_interrupted;
     const TrajectoryResult& result = run.go(listeners);
-    const RunVerdict verdict = run.verdict();
+    const RunVerdict verdict = run.verdict([&] {
+        if (is_interrupted == 0 && options.progress && !ask(options.progress, 1.0)) is_interrupted = 1;
+        return is_interrupted == 0;
+    });
     finish(trajectory, run, result, verdict);
     if (!verdict.failure.empty())
         throw RunFailure(fmt::format("{}: {}", run.scene().path, verdict.failure), std::move(trajectory));

@@ -348,8 +348,16 @@ struct Stepper::Parts {
 
 Stepper::Stepper(const Kernel& kernel) : parts_(guarded([&] { return std::make_unique<Parts>(kernel); })) {}
 Stepper::Stepper(const Stepper& other) : parts_(std::make_unique<Parts>(*other.parts_)) {}
+// q() and p() stay in their places.
 Stepper& Stepper::operator=(const Stepper& other) {
-    parts_ = std::make_unique<Parts>(*other.parts_);
+    if (this == &other) return *this;
+    auto copy = std::make_unique<Parts>(*other.parts_);
+    if (parts_ && parts_->n() == copy->n())
+        for (std::vector<double> Parts::*state : {&Parts::q, &Parts::p}) {
+            std::copy((*copy.*state).begin(), (*copy.*state).end(), (*parts_.*state).begin());
+            std::swap(*copy.*state, *parts_.*state);
+        }
+    parts_ = std::move(copy);
     return *this;
 }
 Stepper::Stepper(Stepper&&) noexcept = default;

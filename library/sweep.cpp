@@ -164,7 +164,8 @@ Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& option
         sweep.interrupted = study->compute(0, count, sink, progress, &is_interrupted).interrupted;
         sweep.warnings = in_algebra([&] {
             std::vector<std::string> warnings = warnings_of(*study, worst);
-            if (!study->first_setting().steps.reaches_end)
+            const bool any_ends = std::any_of(sweep.stop.begin(), sweep.stop.end(), [](int stop) { return stop == 0; });
+            if (!study->first_setting().steps.reaches_end && !sweep.interrupted && any_ends)
                 warnings.emplace_back(
                     "the end time is not a multiple of the step: the runs end at the last multiple before it");
             for (std::string& warning : study->end()) warnings.push_back(std::move(warning));

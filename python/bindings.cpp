@@ -101,7 +101,8 @@ class InUse {
 public:
     explicit InUse(const lob::Stepper& stepper) : stepper_(&stepper) {
         if (!all().insert(stepper_).second)
-            throw lob::InputError("this Stepper takes steps in another thread; give each thread its own, by copy()");
+            throw lob::InputError(
+                "this Stepper is taking steps; give each thread one of its own, a copy() from before they begin");
     }
     ~InUse() { all().erase(stepper_); }
     InUse(const InUse&) = delete;
@@ -154,10 +155,20 @@ void start(lob::Stepper& stepper, double t, const py::object& q, const py::objec
     else
         stepper.start(t, row_of(position, n, "q"), row_of(rate, n, "p"));
 }
-template <class Function, class... Arguments>
-auto alone(lob::Stepper& stepper, Function function, const Arguments&... arguments) {
+template <class Stepper, class Function, class... Arguments>
+auto alone(Stepper& stepper, Function function, const Arguments&... arguments) {
     const InUse in_use(stepper);
     return std::invoke(function, stepper, arguments...);
+}
+py::object copy_of(const lob::Stepper& stepper) {
+    return py::cast(lob::Stepper(stepper));
+}
+py::object state_at(const lob::Stepper& stepper, double t) {
+    auto [q, velocity] = stepper.at(t);
+    return py::cast(std::pair(owned(std::move(q)), owned(std::move(velocity))));
+}
+py::object tangent_of(const lob::Stepper& stepper) {
+    return owned(stepper.tangent(), static_cast<py::ssize_t>(2 * stepper.coordinates()));
 }
 
 // What the last holder of a scene destroys are formulas, too.
@@ -412,8 +423,12 @@ void add_stepper(py::module_& module) {
             },
             py::arg("t"), py::arg("q"), py::arg("p") = py::none(), py::kw_only(), py::arg("velocity") = py::none(),
             "Another place to go on from: positions, and momenta or velocities.")
-        .def("set", &lob::Stepper::set, py::arg("name"), py::arg("value"),
-             "A parameter or an input, from the next step on.")
+        .def(
+            "set",
+            [](lob::Stepper& stepper, const std::string& name, double value) {
+                alone(stepper, &lob::Stepper::set, name, value);
+            },
+            py::arg("name"), py::arg("value"), "A parameter or an input, from the next step on.")
         .def(
             "set_inputs",
             [](lob::Stepper& stepper, const Array& values) {
@@ -421,12 +436,12 @@ void add_stepper(py::module_& module) {
                 if (values.ndim() != 1 || static_cast<std::size_t>(values.size()) != wanted)
                     throw lob::InputError("set_inputs needs " + std::to_string(wanted) +
                                           " numbers, one for each input of the scene");
-                stepper.set_inputs(values.data());
+                alone(stepper, &lob::Stepper::set_inputs, values.data());
             },
             py::arg("values"), "All inputs of the scene, in its order, from the next step on.")
         .def("parameter", &lob::Stepper::parameter, py::arg("name"))
         .def(
-            "copy", [](const lob::Stepper& stepper) { return lob::Stepper(stepper); }, "A second motion from here.")
+            "copy", [](const lob::Stepper& stepper) { return alone(stepper, &copy_of); }, "A second motion from here.")
         .def_property_readonly("t", &lob::Stepper::t)
         .def_property_readonly("q", [vector](const py::object& self) { return vector(self, &lob::Stepper::q); })
         .def_property_readonly("p", [vector](const py::object& self) { return vector(self, &lob::Stepper::p); })
@@ -437,17 +452,10 @@ void add_stepper(py::module_& module) {
         .def_property_readonly("multipliers", [](const lob::Stepper& stepper) { return owned(stepper.multipliers()); })
         .def_property_readonly("step_size", &lob::Stepper::step_size)
         .def(
-            "at",
-            [](const lob::Stepper& stepper, double t) {
-                auto [q, velocity] = stepper.at(t);
-                return std::pair(owned(std::move(q)), owned(std::move(velocity)));
-            },
-            py::arg("t"), "Position and velocity at a time inside the last step, on its own polynomial.")
+            "at", [](const lob::Stepper& stepper, double t) { return alone(stepper, &state_at, t); }, py::arg("t"),
+            "Position and velocity at a time inside the last step, on its own polynomial.")
         .def(
-            "tangent",
-            [](const lob::Stepper& stepper) {
-                return owned(stepper.tangent(), static_cast<py::ssize_t>(2 * stepper.coordinates()));
-            },
+            "tangent", [](const lob::Stepper& stepper) { return alone(stepper, &tangent_of); },
             "d(q1, p1)/d(q, p) of the next step, 2n x 2n; with a clock there is none.")
         .def(
             "take_events", [](lob::Stepper& stepper) { return events_of(stepper.take_events(), stepper.events()); },

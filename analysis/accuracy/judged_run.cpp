@@ -33,10 +33,12 @@ std::string loss_of(const Scene& scene, const TrajectoryRequest& request, const 
     if (!error || !error->is_lost()) return "";
     if (error->rests)
         return fmt::format(
-            "the run rests where it begins, q = {}, p = {}: this equilibrium is unstable, and a start that differs by "
-            "rounding leaves it. What a motion does that begins there is not known. Start elsewhere, or try "
-            "--beyond-horizon, where the run shall rest.",
-            list_text(request.q), list_text(request.p));
+            "the run rests where it begins, q = {}, p = {}, but a start that differs by rounding leaves it: the "
+            "equilibrium is unstable (`lobatto stability` tells), or the step too long for it. What a motion does that "
+            "begins there is not known. Start elsewhere, or try a smaller step, such as h = {:.6g}, or "
+            "--beyond-horizon, "
+            "where the run shall rest.",
+            list_text(request.q), list_text(request.p), request.step / 2);
     const std::string clock = clock_advice(scene);
     const char* const why = error->companion_stopped
                                 ? "there the same run with 2/3 of the step cannot go on, and what follows is not known"
@@ -51,7 +53,7 @@ std::string loss_of(const Scene& scene, const TrajectoryRequest& request, const 
 
 constexpr double missed = 2;  // times the error wanted
 
-std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) {
+std::vector<std::string> warnings_of(const MeasuredError& error, double wanted, bool ended_by_caller) {
     if (error.is_lost()) return {};
     std::vector<std::string> texts;
     if (error.worst() > large_error)
@@ -66,9 +68,9 @@ std::vector<std::string> warnings_of(const MeasuredError& error, double wanted) 
                         wanted, error.at_end));
     if (!error.is_known_at_end())
         texts.push_back(fmt::format(
-            "the error was measured only to t = {:.4g}, because the companion took longer than the run; of the rest "
-            "nothing is known. Choose an earlier end, or a larger step",
-            error.until));
+            "the error was measured only to t = {:.4g}, because the companion {}; of the rest nothing is known{}",
+            error.until, ended_by_caller ? "was not waited for" : "took longer than the run",
+            ended_by_caller ? "" : ". Choose an earlier end, or a larger step"));
     return texts;
 }
 
@@ -190,11 +192,7 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
                       RunObservers& observers, bool accepts_lost) {
     const Scene& scene = run.scene;
     RunVerdict verdict;
-    if (observers.companion)
-        verdict.error = observers.companion->finish(result, [&] {
-            if (request.progress) request.progress(result.steps_done);
-            return request.interrupted == nullptr || *request.interrupted == 0;
-        });
+    verdict.error = observers.error;
     if (verdict.error && !verdict.error->complete && run.outline.conserves_energy() && result.energy_start != 0 &&
         result.energy_error_largest > told_by_energy * verdict.error->at_end * std::fabs(result.energy_start))
         verdict.error->at_end = std::nan("");
@@ -203,7 +201,7 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
             "the error is not measured, because an earlier part of the run had no companion, "
             "or one in other numbers");
     else if (observers.companion && !verdict.error && result.status == LOBATTO_OK && !result.interrupted &&
-             result.steps_done > 0 && result.stop < 0)
+             result.steps_done > 0 && result.stop < 0 && !observers.ended_by_caller)
         verdict.warnings.emplace_back(
             "the error is not measured, because the companion took too long to the first comparison; keep states on "
             "the way (--every)");
@@ -211,7 +209,7 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
     if (departure.empty() && !accepts_lost && !scene.run.beyond_horizon)
         departure = loss_of(scene, request, verdict.error);
     if (verdict.error && departure.empty())
-        for (const std::string& warning : warnings_of(*verdict.error, scene.run.error))
+        for (const std::string& warning : warnings_of(*verdict.error, scene.run.error, observers.ended_by_caller))
             verdict.warnings.push_back(warning);
     if (result.status == LOBATTO_OK && result.steps_done > 1 && !scene.clock && !scene.is_cut())
         for (const std::string& warning : StepJudge::warnings(

@@ -102,7 +102,9 @@ public:
     StepJudge judge;
     EnergyWatch energy;
     std::optional<Companion> companion;
-    bool began_unmeasured = false;  // in an earlier part of the run, so that nothing can be compared
+    std::optional<MeasuredError> error;  // of the companion, once it has ended
+    bool ended_by_caller = false;        // it was not waited for
+    bool began_unmeasured = false;       // in an earlier part of the run, so that nothing can be compared
     Domains domains;
     std::vector<double> parameters;
     std::vector<double> left_domain;  // t, q, p: the first state where a formula has no value

@@ -27,9 +27,10 @@ constexpr std::int64_t states_looked_at = 200;
 constexpr int most_starts = 24;                   // of the search for equilibria
 constexpr std::size_t most_for_eigenvalues = 64;  // coordinates: matrices of twice as many rows
 constexpr std::size_t most_reported_coordinates = 1024;
-constexpr std::int64_t most_steps = 10'000'000;     // of a run to look at, times coordinates
-constexpr int fewest_parts = 8, most_parts = 4096;  // of a step: shorter ones stand for the motion itself
-constexpr double thrown = 1000;                     // times as far as anything before
+constexpr std::int64_t most_steps = 10'000'000;  // of a run to look at, times coordinates
+constexpr int fewest_parts = 8;                  // of a step: shorter ones stand for the motion itself
+constexpr int most_parts = 16384;                // over the coordinates squared
+constexpr double thrown = 1000;                  // times as far as anything before
 
 std::vector<double> plain(const VectorXd& values) {
     return {values.begin(), values.end()};
@@ -134,28 +135,32 @@ void leave_out_what_is_thrown(const StabilityReport& report, Linearisation& line
     if (report.member.limits.empty()) return;
     const double limit = report.member.limits.front().approximation(20).to_double();
     const auto size = [](const State& state) { return state.q.cwiseAbs().maxCoeff(); };
-    const auto first_beyond = [&](double extent) {
-        return std::find_if(states.begin(), states.end(),
-                            [&](const State& state) { return !(size(state) <= thrown * extent); });
-    };
     double extent = size(states.front());
-    if (first_beyond(extent) == states.end()) return;
+    const auto goes_far = [&](const State& state) { return !(size(state) <= thrown * extent); };
+    if (std::none_of(states.begin(), states.end(), goes_far)) return;
     LoadedStepper<double> stepper(report.kernel);
     stepper.prepare(report.parameters, report.step);
     for (const State& state : states) {
         const Pace pace = pace_at(stepper, linearisation, state);
         extent = std::fmax(extent, std::fmax(size(state), report.step * pace.speed));
-        const double angle = report.step * pace.frequency.value_or(0);
+        const double omega = pace.frequency.value_or(0), angle = report.step * omega, from = state.time;
         if (angle * angle <= limit) continue;
-        states.erase(first_beyond(extent), states.end());
+        // Forces as large as there lead no farther than this, whatever they do.
+        const auto is_thrown = [&](const State& later) {
+            const double turns = omega * (later.time - from);
+            return !(size(later) <= thrown * extent * (1 + turns * turns));
+        };
+        states.erase(std::find_if(states.begin(), states.end(), is_thrown), states.end());
         return;
     }
 }
 
-// Into how many parts a step of this h omega is divided to stand for the motion itself.
-int parts_of(double angle) {
+// Into how many parts a step of this h omega is divided to stand for the motion itself: those of methods with a limit
+// are below it.
+int parts_of(const StabilityReport& report, double angle) {
+    const int n = report.kernel->coordinates;
     int parts = fewest_parts;
-    while (parts < most_parts && angle > parts) parts *= 2;
+    while (!report.member.limits.empty() && angle > parts && parts < most_parts / (n * n)) parts *= 2;
     return parts;
 }
 
@@ -178,7 +183,7 @@ TrajectoryReport trajectory_report(const StabilityReport& report, Linearisation&
         if (state.q.size() > static_cast<Eigen::Index>(most_for_eigenvalues)) continue;
         const std::vector<double> q = plain(state.q), p = plain(state.p);
         const auto values = step_eigenvalues(stepper, report.step, state.time, q, p);
-        const int parts = parts_of(angle);
+        const int parts = parts_of(report, angle);
         finer.prepare(report.parameters, report.step / parts);
         const auto exact = step_eigenvalues(finer, report.step / parts, state.time, q, p, parts);
         if (!values || !exact) continue;

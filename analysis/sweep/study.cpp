@@ -282,7 +282,9 @@ StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink
             if (times.interrupted) return;  // what is handed on has no gaps
             const Verdict verdict = judges_->judge(trajectory);
             times.interrupted = verdict.interrupted;
-            if (!verdict.interrupted) sink(trajectory, verdict, request);
+            if (verdict.interrupted) return;
+            if (verdict.status == LOBATTO_OK && trajectory.reduced != nullptr) count_missing(*trajectory.reduced);
+            sink(trajectory, verdict, request);
         };
         const EnsembleResult result = integrate(*current_->kernel, request);
         steps_gone += request.count * request.steps;
@@ -291,6 +293,14 @@ StudyTimes SweepStudy::compute(std::int64_t first, std::int64_t last, const Sink
                    result.threads, (*current_->kernel)->lanes == 0 && !device_ ? 0 : result.lanes});
     }
     return times;
+}
+
+// What is kept and has no value, as the root of what became negative. first() is no number where nothing was met.
+void SweepStudy::count_missing(const std::vector<double>& kept) {
+    const std::vector<Reduction>& asked = scene_.outputs.kept;
+    missing_.resize(asked.size());
+    for (std::size_t k = 0; k < std::min(asked.size(), kept.size()); ++k)
+        if (asked[k].of != Reduction::Of::first && std::isnan(kept[k])) ++missing_[k];
 }
 
 void SweepStudy::note_warning() {
@@ -302,6 +312,11 @@ void SweepStudy::note_warning() {
 
 std::vector<std::string> SweepStudy::end() {
     note_warning();
+    for (std::size_t k = 0; k < missing_.size(); ++k)
+        if (missing_[k] > 0)
+            warnings_.push_back(fmt::format("{} has no value in {} {} that reached the end, and is nan there",
+                                            scene_.outputs.kept[k].text, missing_[k],
+                                            missing_[k] == 1 ? "trajectory" : "trajectories"));
     judges_.reset();
     current_.reset();
     return std::exchange(warnings_, {});

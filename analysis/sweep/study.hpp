@@ -92,6 +92,7 @@ private:
     Overrides values_of(std::int64_t index) const;
     void put_on_device(Setting& setting) const;
     void enter(std::int64_t number);
+    void count_missing(const std::vector<double>& kept);
     void note_warning();
 
     Scene as_written_, scene_;
@@ -109,7 +110,8 @@ private:
     std::unique_ptr<Setting> current_;
     std::optional<Judges> judges_;
     std::vector<std::string> warnings_;
-    std::vector<std::int64_t> steps_;  // of a trajectory, by setting
+    std::vector<std::int64_t> missing_;  // of each that is kept: trajectories in which it has no value
+    std::vector<std::int64_t> steps_;    // of a trajectory, by setting
 };
 
 }  // namespace lobatto

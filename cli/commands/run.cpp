@@ -356,7 +356,7 @@ void run(const RunOptions& options) {
     const Interruption interruption;
     const TrajectoryResult& result = go_into(files, opened, identity, quiet);
     if (!quiet && !options.companion.empty()) say("measuring the error in " + options.companion);
-    const RunVerdict verdict = opened.verdict();
+    const RunVerdict verdict = opened.verdict([] { return *Interruption::flag() == 0; });
     say.clear();
     for (const std::string& warning : verdict.warnings) tell("lobatto: warning: {}.\n", warning);
     if (options.json) {

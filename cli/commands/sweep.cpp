@@ -248,7 +248,9 @@ void sweep(const SweepOptions& options) {
         throw ExitCode{interrupted_exit};
     }
     if (tally.failed() > 0)
-        throw ComputationError(failures_text(*study, tally) + fmt::format(" What was computed is in {}.", path));
+        throw ComputationError(failures_text(*study, tally) +
+                               (is_standard_output(path) ? " What was computed was written."
+                                                         : fmt::format(" What was computed is in {}.", path)));
 }
 
 }  // namespace

@@ -11,8 +11,9 @@ int main() {
     arm.prepare(values, 0.02);
     arm.start(0, q, p);
     while (arm.time() < 4 - 1e-9) {
-        double velocity[2];
-        if (arm.velocity(arm.time(), arm.q, arm.p, velocity) != lobatto::Status::ok) return 3;
+        double momentum[2], velocity[2];
+        arm.momentum(momentum);
+        if (arm.velocity(arm.time(), arm.q, momentum, velocity) != lobatto::Status::ok) return 3;
         values.torque = -2 * velocity[0];
         if (lobatto::set_inputs(arm, values) != lobatto::Status::ok || arm.step() != lobatto::Status::ok) return 3;
     }

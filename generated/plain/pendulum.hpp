@@ -13,6 +13,10 @@
 //   while (x.t < 10 && motion::step(parameters, 0.01, x)) std::printf("%g %g\n", double(x.t), double(x.q[0]));
 #pragma once
 
+#ifdef __FAST_MATH__
+#error "-Ofast and -ffast-math give wrong motions: compile this without them"
+#endif
+
 #include <cmath>
 #include <limits>
 
@@ -28,7 +32,7 @@ constexpr int s = 4;
 constexpr real c[4] = {0.0, 0.276393202250021, 0.7236067977499789, 1.0};
 // Their weights.
 constexpr real b[4] = {0.08333333333333333, 0.4166666666666667, 0.4166666666666667, 0.08333333333333333};
-// Phase matrix of the inner points.
+// Stage matrix of the inner points.
 constexpr real A[2][2] = {{0.016666666666666666, -0.0015028323958245708}, {0.1848361657291579, 0.016666666666666666}};
 
 struct Parameters {

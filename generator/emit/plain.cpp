@@ -238,7 +238,10 @@ public:
         : d_(derivation), p_(optimised.programs), precision_(precision), name_(name) {}
 
     std::string text() const {
-        std::string all = preamble() + "#pragma once\n\n#include <cmath>\n#include <limits>\n";
+        std::string all = preamble() +
+                          "#pragma once\n\n#ifdef __FAST_MATH__\n"
+                          "#error \"-Ofast and -ffast-math give wrong motions: compile this without them\"\n#endif\n\n"
+                          "#include <cmath>\n#include <limits>\n";
         if (is_general()) all += "#include <utility>\n";
         all += fmt::format("\nnamespace lobatto::plain::{} {{\n\nusing real = {};\n\n", name_, type_name(precision_)) +
                shapes() + parameters() + state() + rounding() + helpers;
@@ -330,7 +333,7 @@ private:
                 table("b", rule.b, rule.is_explicit() ? "Kicks at these." : "Their weights.");
         // Without inner points there is no stage matrix, but the step that is never taken must compile.
         if (rule.is_explicit()) return text;
-        return text + (rule.points > 2 ? table("A", rule.A, "Phase matrix of the inner points.")
+        return text + (rule.points > 2 ? table("A", rule.A, "Stage matrix of the inner points.")
                                        : table("A", GiNaC::matrix(1, 1), "No inner points: unused."));
     }
 

@@ -101,7 +101,8 @@ void Parser::refuse_emptiness() const {
         fail(token(), fmt::format("there is no '{}' in formulas: write one if inside another", right));
     static constexpr std::array units{"m",  "s",  "kg",  "N",  "rad", "deg", "Hz", "mm",      "cm",
                                       "km", "ms", "min", "Nm", "J",   "W",   "Pa", "degrees", "seconds"};
-    if (tokens_[next_ - 1].kind == Token::Kind::number && find(right) == nullptr &&
+    const bool calls = next_ + 1 < tokens_.size() && tokens_[next_ + 1].is('(');  // min(q, 1)
+    if (tokens_[next_ - 1].kind == Token::Kind::number && find(right) == nullptr && !calls &&
         std::find(units.begin(), units.end(), right) != units.end())
         fail(token(), right.starts_with("deg")
                           ? fmt::format("angles are in radians: write {}*pi/180", left)

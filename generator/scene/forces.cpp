@@ -65,6 +65,16 @@ void SystemReader::add_force_along(const Subject& subject, const Entry& entry, c
     const Operand along = evaluate(source_, parse_formula(source_, key, in_key), in_key);
     const Operand force = evaluate(source_, parse_formula(source_, formula_of(source_, entry), scope), scope);
     const Arithmetic arithmetic(scope.formula, names_.work);
+    if (along.velocities) {
+        GiNaC::exmap at_rest;
+        for (const Coordinate& coordinate : scene_.coordinates) at_rest[coordinate.velocity] = 0;
+        const GiNaC::exset held = symbols_of(along.expression.subs(at_rest));
+        for (const Coordinate& coordinate : scene_.coordinates)
+            if (held.count(coordinate.position) > 0)
+                fail(subject.name.at, fmt::format("{} is no rate: it holds {} without a velocity; write two lines, one "
+                                                  "for its rate and one for the rest",
+                                                  name, coordinate.written));
+    }
     bool acts = false;
     for (Coordinate& coordinate : scene_.coordinates) {
         const ex slope = along.expression.diff(along.velocities ? coordinate.velocity : coordinate.position);

@@ -207,11 +207,12 @@ struct Scene {
     // Coordinates that have an equation and stay, and why, as "x: its multiplier is asked for".
     std::vector<std::string> not_eliminated;
     std::vector<Impact> impacts;
-    std::vector<Switch> switches;             // their sides are the last parameters, with their values at the start
-    std::vector<Switch> seen_switches;        // of formulas that only look at the motion: no kernel knows them
-    std::vector<TableUse> tables;             // measured values in any formula
-    std::vector<DomainCondition> conditions;  // of all formulas but events and pictures, as written
-    std::vector<Requirement> requirements;    // of masses, inertia, lengths, restitutions
+    std::vector<Switch> switches;  // their sides are the last parameters, with their values at the start
+    std::vector<std::string> inputs_without_speed;  // "u in x'": rates of definitions that do not know that u moves
+    std::vector<Switch> seen_switches;              // of formulas that only look at the motion: no kernel knows them
+    std::vector<TableUse> tables;                   // measured values in any formula
+    std::vector<DomainCondition> conditions;        // of all formulas but events and pictures, as written
+    std::vector<Requirement> requirements;          // of masses, inertia, lengths, restitutions
     Method method;
     std::optional<Clock> clock;
     Run run;

@@ -56,6 +56,7 @@ void SystemReader::read() {
     read_forces();
     read_constraints();
     read_impacts();
+    find_inputs_without_speed();
     names_.records = false;
     read_places();
     names_.records = true;
@@ -253,29 +254,22 @@ void SystemReader::refuse_unused() const {
             if (!used.contains(&names_.all.at(entry.key)))
                 fail(entry.at, fmt::format("{} {} occurs in no formula; use it or remove it", what, entry.key));
     }
-    refuse_inputs_without_speed();
 }
 
-// That stand in a definition whose rate is asked for, and nowhere else: they would move nothing.
-void SystemReader::refuse_inputs_without_speed() const {
-    const Entry* const section = root_.find("inputs");
-    if (section == nullptr) return;
-    const GiNaC::exset held = symbols_of_kernel();
-    for (const Entry& entry : section->value.entries)
-        for (const Operand& input : names_.all.at(entry.key).values) {
-            if (held.count(input.expression) > 0) continue;
-            for (const auto& [name, known] : names_.all) {
-                if (!known.definition) continue;
-                for (const auto& [indices, value] : known.definition->values)
-                    if (value.rate && value.value.expression.has(input.expression) &&
-                        !value.value.expression.has(scene_.time))  // else its speed may be there
-                        fail(entry.at,
-                             fmt::format("input {0} moves nothing: it is constant within a step, so {1}' does not hold "
-                                         "it. Write {0} + {0}_speed*(t - {0}_time) in its place, with these three as "
-                                         "inputs",
-                                         entry.key, name));
-            }
+// Inputs in definitions whose rates were asked for, without the time: these rates do not know that they move.
+void SystemReader::find_inputs_without_speed() {
+    for (const Parameter& input : scene_.parameters) {
+        if (!input.is_input) continue;
+        for (const auto& [name, known] : names_.all) {
+            if (!known.definition) continue;
+            for (const auto& [indices, value] : known.definition->values)
+                if (value.rate && value.value.expression.has(input.symbol) &&
+                    !value.value.expression.has(scene_.time)) {
+                    scene_.inputs_without_speed.push_back(fmt::format("{} in {}'", input.written, name));
+                    break;
+                }
         }
+    }
 }
 
 // A formula whose value with the parameters of the scene must be a real number that a double can hold.

@@ -102,8 +102,8 @@ private:
     void read_plots(const Entry& entry);
     void name_energy_and_momenta();
     void read_kept(const Source& source, const Text& text);
+    void find_inputs_without_speed();
     GiNaC::exset symbols_of_kernel() const;
-    void refuse_inputs_without_speed() const;
     const Group& group_of(const Subject& subject) const;
     void read_places();
     void read_initial_values();

@@ -1,8 +1,9 @@
 # lobatto_add_kernel(TARGET SCENE scene.toml [POINTS n | STAGES n | SPLITTING n] [NUMBERS name] [ARITHMETIC name] [ENSEMBLE] [PLAIN])
 #
 # Writes the integrator of the scene when TARGET is built, and again when the scene, a file of its tables or the
-# generator changes. TARGET includes it as "NAME.hpp", NAME the stem of the scene file, and is compiled with the flags
-# of kernels, so that it computes the same bits as `lobatto run`. ENSEMBLE: lobatto::Ensemble too, trajectories side by
+# generator changes. TARGET includes it as "NAME.hpp", NAME the stem of the scene file, and all of it is compiled with
+# the flags of kernels, -march=native among them unless its property LOBATTO_PORTABLE is set, so that it computes the same
+# bits as `lobatto run`. ENSEMBLE: lobatto::Ensemble too, trajectories side by
 # side. PLAIN: the textbook's version (`lobatto emit --plain`), for any flags but -ffast-math.
 # LOBATTO_PROGRAM names the program that writes it.
 function(lobatto_add_kernel target)

@@ -65,9 +65,9 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
             raise InputError(f"{name} is a table, such as {name}=dict({examples[name]}), "
                              f"not {table!r}")
     formulas = [lagrangian, *(str(formula) for formula in (definitions or {}).values())]
-    foreign = re.search(r"[^\W\d_a-zA-Z]\w*", re.sub(r'"[^"]*"|#[^\n]*', "", "\n".join(formulas)))
-    if foreign:
-        raise InputError(f"'{foreign.group()}' is no name: names have the letters a to z, digits and _, as theta' has")
+    for name in variables:
+        if not name.isascii():
+            raise InputError(f"'{name}' is no name: names have the letters a to z, digits and _, such as theta")
     moving = {name for formula in formulas
               for name in re.findall(r"([A-Za-z_]\w*)(?:\[[^\]]*\])?'", re.sub("#[^\n]*", "", formula))}  # no comments
     moving -= set(definitions or {})

@@ -266,7 +266,16 @@ TEST_CASE("an equilibrium is no motion that is lost, wherever it is") {
         rest);
     const test::Finished left = unstable.run({"--until", "100"});
     CHECK(left.exit_code == 3);
-    CHECK(test::contains(left.err,
-                         "the run rests where it begins, q = (0, 1), p = (0, 0): this equilibrium is unstable"));
-    CHECK(test::contains(left.out, "  measured error          not known: the run rests in an unstable equilibrium\n"));
+    CHECK(test::contains(left.err, "the run rests where it begins, q = (0, 1), p = (0, 0), but a start that differs "));
+    CHECK(
+        test::contains(left.out, "  measured error          not known: the run rests, and a start beside it leaves\n"));
+    // Steps that are too long leave one that is stable.
+    const test::MeasuredScene stable(
+        "lagrangian = \"q'^2/2 + y'^2/2 + 100*cos(q - 1) - y^2\"\n[coordinates]\nq = { position = 1, velocity = 0 }\n"
+        "y = { position = 0, velocity = 0 }\n[method]\npoints = 2\n[run]\nstep = 0.35\nuntil = 200\n");
+    const test::Finished thrown = stable.run();
+    CHECK(thrown.exit_code == 3);
+    CHECK(test::contains(thrown.err, "or the step too long for it"));
+    CHECK(test::contains(thrown.err, "a smaller step, such as h = 0.175"));
+    CHECK(stable.run({"--step", "0.1"}).exit_code == 0);
 }

@@ -242,6 +242,20 @@ TEST_CASE("errors of the library have the command line's texts and exit codes") 
           "start: nan is no time");
 }
 
+TEST_CASE("positions stay in their place where a stepper goes back to a copy") {
+    lob::Stepper stepper(lob::compile(lob::Scene(scenes + "pendulum.toml")));
+    const double *const q = stepper.q(), *const p = stepper.p(), before = q[0];
+    const lob::Stepper saved(stepper);
+    stepper.advance(10);
+    REQUIRE(q[0] != before);
+    stepper = saved;
+    CHECK(stepper.q() == q);
+    CHECK(stepper.p() == p);
+    CHECK(q[0] == before);
+    stepper.step();
+    CHECK(q[0] == stepper.q()[0]);
+}
+
 TEST_CASE("a stepper whose step fails stays where it was") {
     lob::Settings settings;
     settings.step = "2.9";

@@ -27,7 +27,7 @@ constexpr double same_time = 0x1p-48;   // relative: times that differ by no mor
 constexpr double same_as_rounded = 16;  // likewise, roundings of the kernel's numbers
 // Evaluations of terms along steps of the companion, for what is narrow in them: three of each in a step without.
 constexpr std::int64_t most_evaluations = 12'000'000;
-constexpr int polls = 500;  // of one that is waited for, before who waits is asked whether to go on
+constexpr int polls = 500;  // while the companion is waited for: from one question whether to wait on to the next
 
 }  // namespace
 
@@ -425,7 +425,7 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result, c
     int count = 0;
     bool is_wanted = true;
     const auto goes_on = [&] {
-        if (asked && is_wanted && count++ % polls == 0) is_wanted = asked();
+        if (asked && is_wanted && ++count % polls == 0) is_wanted = asked();
         return is_wanted;
     };
     const bool has_end =

@@ -114,6 +114,7 @@ private:
     // 2n, of the motion until so many comparisons; 0: of what does not move, or by rounding alone.
     std::vector<double> amplitudes(std::size_t comparisons) const;
     std::vector<double> row_at(std::size_t comparison) const;
+    bool run_rests() const;
     void look_at_paces(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& of_run,
                        const std::vector<double>& of_companion) const;
     MeasuredError compare(const TrajectoryResult& result) const;

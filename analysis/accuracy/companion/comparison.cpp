@@ -24,6 +24,7 @@ constexpr std::size_t windows = 8;  // in time, between the first error and the 
 // not count.
 constexpr double exponential = 14, certain = 25;
 constexpr double largest_jump = 0.45;  // of all doublings, from one window to the next
+constexpr int between = 16;            // parts of a step
 constexpr double most_beyond = 8;      // times what was compared: exponential growth might not be seen in it yet
 
 using ErrorCourse = std::vector<std::pair<double, double>>;  // time, how far the motions are apart
@@ -143,6 +144,21 @@ std::vector<double> Companion::amplitudes(std::size_t comparisons) const {
     return shared;
 }
 
+// At its steps, and between them: there may be a whole oscillation in each.
+bool Companion::run_rests() const {
+    const std::vector<double> row = row_at(0), start(row.begin() + 1, row.end());
+    if (is_clocked() || !rests(start, range_.least, range_.most, run_epsilon_)) return false;
+    CompanionPlace place{NumberStepper(kernel_), as_parts({request_.time}, parts_),
+                         as_parts({0}, parts_),  request_.whole_q,
+                         request_.whole_p,       request_.arrivals};
+    place.set_step(times_fraction(request_.whole_step, 1, between), request_.whole_parameters);
+    place.advance(between / 2, 0);
+    Range range;
+    widen_to(range.least, range.most, start.data(), start.size());
+    widen_to(range.least, range.most, place.rounded_row().data(), start.size());
+    return place.status == LOBATTO_OK && rests(start, range.least, range.most, run_epsilon_);
+}
+
 // A wrong motion may grow, and its amplitude with it. When it began to be wrong is told by the amplitude until then.
 void Companion::lose_where_it_began(MeasuredError& error, const std::vector<double>& amplitude, double of_run) const {
     constexpr double least = 1e-3;  // of the amplitude: what is less may be rounding
@@ -198,8 +214,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         error.lost_p = request_.p;
     }
     error.complete = count == run_.size();
-    const std::vector<double> first = row_at(0);
-    error.rests = rests({first.begin() + 1, first.end()}, range_.least, range_.most, run_epsilon_);
+    error.rests = run_rests();
     if (!error.rests) error.doubling = doubling_of(course);  // else what grows are amplitudes, of the companion
     // Errors that grow exponentially do not shrink again: two motions that were out of step have met by chance.
     const auto large = std::find_if(course.begin(), course.end(), [](const auto& c) { return c.second > by_chance; });

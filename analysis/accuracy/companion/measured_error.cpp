@@ -7,7 +7,7 @@ namespace lobatto {
 
 std::string text_of(const MeasuredError& error, const Scene& scene) {
     const std::string chaos = error.doubling ? fmt::format("; errors double every {:.3g}", *error.doubling) : "";
-    if (error.rests && error.is_lost()) return "not known: the run rests in an unstable equilibrium";
+    if (error.rests && error.is_lost()) return "not known: the run rests, and a start beside it leaves";
     if (error.companion_stopped && error.lost_after)
         return fmt::format("not known after t = {:.4g}, where the same run with 2/3 of the step stops",
                            *error.lost_after);

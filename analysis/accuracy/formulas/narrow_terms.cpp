@@ -28,6 +28,15 @@ constexpr double flat = 20;            // tanh(20) is 1
 constexpr std::size_t most_bends = 4;  // of a table: the sharpest
 constexpr double sharp = 0.02;         // of what the table covers
 
+// As (1 - v^2)^(-3/2), which is never small.
+bool grows_without_bound(const ex& mass, const std::vector<GiNaC::symbol>& velocities) {
+    for (auto part = mass.preorder_begin(); part != mass.preorder_end(); ++part)
+        if (GiNaC::is_a<GiNaC::power>(*part) && part->op(1).info(GiNaC::info_flags::negative) &&
+            std::any_of(velocities.begin(), velocities.end(), [&](const auto& v) { return part->op(0).has(v); }))
+            return true;
+    return false;
+}
+
 }  // namespace
 
 NarrowTerms::NarrowTerms(const SystemOutline& system) {
@@ -38,11 +47,12 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
     GiNaC::exset known;
     bool is_kinetic = false;
     const auto add = [&](Kind kind, const ex& u) {
-        if (terms_.size() == most_terms || !known.insert(u).second) return;
+        if (terms_.size() == most_terms) return;
         // Near the speed of light 1 - v^2 is small, and where the way is not that of the motion, smaller: but a mass
         // that grows with the velocity hinders nothing.
         const auto holds = [&](const GiNaC::symbol& v) { return u.has(v); };
         if (is_kinetic && std::any_of(system.v.begin(), system.v.end(), holds)) return;
+        if (!known.insert(u).second) return;
         std::vector<std::size_t> coordinates;
         for (std::size_t k = 0; k < system.q.size(); ++k)
             if (u.has(system.q[k]) || u.has(system.v[k])) coordinates.push_back(k);
@@ -82,9 +92,8 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
     is_kinetic = false;
     for (const ex& force : system.outer_force) look_at(force);
     for (const Constraint& constraint : system.constraints) look_at(constraint.value);
-    is_kinetic = true;
     for (const auto& [place, mass] : system.momentum_v.entries())
-        if (place.first == place.second) add(Kind::pole, mass);
+        if (place.first == place.second && !grows_without_bound(mass, system.v)) add(Kind::pole, mass);
 }
 
 // Where on the way, 0 to 1, exp(u) is largest, or |u| least, if the term changes there within half of the way.

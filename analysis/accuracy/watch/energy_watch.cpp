@@ -102,6 +102,8 @@ struct KineticCourse {
     }
 };
 
+constexpr double halved = 0.5, off_dead_points = 0.47;  // a half of the step may end at the dead point, too
+
 std::string why(const Scene& scene, double step, bool too_coarse) {
     const auto jump = std::find_if(scene.switches.begin(), scene.switches.end(),
                                    [&](const Switch& one) { return scene.lagrangian.has(one.side); });
@@ -118,7 +120,7 @@ std::string why(const Scene& scene, double step, bool too_coarse) {
         "The step is too long for the method to be stable or for the forces met there, or it has gone past a "
         "singularity of the potential{}. Try a smaller step, such as h = {:.6g}, an earlier end, or start elsewhere.",
         scene.constraints.empty() ? "" : ", or past a place where constraints depend on one another (a dead point)",
-        scene.constraints.empty() ? step / 2 : 0.47 * step);
+        (scene.constraints.empty() ? halved : off_dead_points) * step);
 }
 
 }  // namespace

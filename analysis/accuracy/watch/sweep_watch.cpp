@@ -112,7 +112,9 @@ bool SweepWatch::run_again(const EnsembleTrajectory& trajectory) {
     again.interrupted = request_.interrupted;
     EnergyWatch watch(outline_, *alone_);
     again.sink = [&](const Records& records) { watch.observe(records); };
-    return integrate(*alone_, again).status == LOBATTO_OK && !watch.departure(outline_, *alone_, again).empty();
+    const TrajectoryResult result = integrate(*alone_, again);
+    // A trajectory that goes on in lanes, with such an error, where alone it cannot, has left the motion, too.
+    return !result.interrupted && (result.status != LOBATTO_OK || !watch.departure(outline_, *alone_, again).empty());
 }
 
 }  // namespace lobatto

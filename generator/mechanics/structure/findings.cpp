@@ -114,22 +114,23 @@ std::vector<Finding> scene_findings(const Scene& scene, const System& system) {
     if (!system.inputs.empty()) {
         std::string list;
         for (const GiNaC::symbol& input : system.inputs) list += (list.empty() ? "" : ", ") + input.get_name();
-        const auto holds_input = [&](const GiNaC::ex& formula) {
-            return std::any_of(system.inputs.begin(), system.inputs.end(),
+        const auto jumps = [&](const GiNaC::ex& formula) {
+            return !formula.has(scene.time) &&
+                   std::any_of(system.inputs.begin(), system.inputs.end(),
                                [&](const GiNaC::symbol& input) { return formula.has(input); });
         };
-        const bool moves_constraint =
-            std::any_of(scene.constraints.begin(), scene.constraints.end(),
-                        [&](const Constraint& constraint) { return holds_input(constraint.value); });
-        const bool moves_wall = std::any_of(scene.impacts.begin(), scene.impacts.end(),
-                                            [&](const Impact& impact) { return holds_input(impact.when.value); });
+        std::vector<std::string> jumping = scene.inputs_without_speed;
+        for (const Constraint& constraint : scene.constraints)
+            if (jumps(constraint.value)) jumping.push_back("the constraint " + constraint.written);
+        for (const Impact& impact : scene.impacts)
+            if (jumps(impact.when.value)) jumping.push_back("the wall " + impact.written);
         find("inputs", true,
-             list + ": a program may change them before each step with set_inputs(); the energy changes with them" +
-                 (moves_constraint || moves_wall
-                      ? fmt::format("; a {} jumps with its input and has no speed: for one that moves, write u + "
-                                    "u_speed*(t - u_time), three inputs",
-                                    moves_constraint ? "constraint" : "wall")
-                      : ""));
+             list + ": a program may change them before each step with set_inputs(); the energy changes with them");
+        if (!jumping.empty())
+            find("inputs without speed", true,
+                 fmt::format("{}: an input jumps between steps. What moves with it needs its speed as a second input "
+                             "(docs/scene_format.md, [inputs])",
+                             fmt::join(jumping, ", ")));
     }
     add_measured_values(system, findings);
     if (!scene.constants.empty()) {

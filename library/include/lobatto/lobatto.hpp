@@ -209,7 +209,9 @@ public:
     /// H(t, q, p); not a number where the scene leaves it out (energy = false) and the motion does not conserve it.
     double energy() const;
     std::vector<double> multipliers() const;  ///< of the constraints, here
-    /// Position and velocity inside the last step, on its own polynomial: t - step_size() <= t <= t().
+    /// Position and velocity inside the last step, on its own polynomial: t - step_size() <= t <= t(), or from where
+    /// advance_to() began its last step. InputError elsewhere, with a clock, after start() and set(), and in a step
+    /// that an impact, a switch or a stop has cut.
     std::pair<std::vector<double>, std::vector<double>> at(double t) const;
     /// One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The trajectory stays where it is. InputError
     /// with a clock, whose steps last as long as the motion makes them; ComputationError where a wall or a switch cuts
@@ -217,7 +219,7 @@ public:
     std::vector<double> tangent() const;
 
     /// A parameter or an input, from the next step on. Another parameter prepares the kernel anew; what controls a
-    /// motion should be an input of the scene, which costs a small part of a step.
+    /// motion should be an input of the scene, which costs at most about a step.
     double parameter(const std::string& name) const;
     void set(const std::string& name, double value);
     /// All inputs, in the order of inputs().

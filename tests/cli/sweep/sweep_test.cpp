@@ -430,6 +430,33 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
     CHECK(test::contains(all.err, ": 2 of 2 trajectories failed: 2 not finite. They are:\n"));
 }
 
+TEST_CASE("a trajectory that goes on in lanes where alone it cannot has left its Lagrangian, measured or not") {
+    const Place place;
+    const std::string scene = place.file("escape.toml");
+    // To infinity in a finite time.
+    test::write_text(scene,
+                     "lagrangian = \"(x'^2 + y'^2)/2 - (x^2 + y^2)/2 - x^2*y + y^3/3\"\n[coordinates]\n"
+                     "x = { position = -0.52, velocity = -0.3749575 }\ny = { position = -0.31004205, velocity = "
+                     "-0.12992165 }\n[method]\nfamily = \"gauss\"\nstages = 3\n[run]\nstep = 0.2\nuntil = 60\n");
+    const test::Finished done = place.sweep({scene, "--vary", "x=-0.52453083,-0.52", "--unmeasured"});
+    CHECK(done.exit_code == 3);
+    CHECK(test::contains(done.err, "2 of 2 trajectories failed"));
+}
+
+TEST_CASE("what is kept and has no value is told") {
+    const Place place;
+    const std::string scene = place.file("falls.toml");
+    test::write_text(
+        scene,
+        "lagrangian = \"x'^2/2 - x^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n[run]\nstep = 0.1\n"
+        "until = 3\n");
+    const test::Finished done =
+        place.sweep({scene, "--vary", "x=-1,1", "--keep", "last(sqrt(x))", "--keep", "first(x = 5)"});
+    CHECK(done.exit_code == 0);
+    CHECK(test::contains(done.err, "warning: last(sqrt(x)) has no value in 1 trajectory that reached the end"));
+    CHECK(!test::contains(done.err, "first"));
+}
+
 TEST_CASE("trajectories that leave their Lagrangian are told from those that stay, also where no energy is asked for" *
           doctest::test_suite("slow")) {
     const Place place;

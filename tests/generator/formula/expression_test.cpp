@@ -176,6 +176,7 @@ TEST_CASE("missing operators and parentheses are named with their mend") {
     check_error("4 N", 3, "numbers have no units: leave 'N' out, or write 4*N for a parameter N");
     check_error("30 deg", 4, "angles are in radians: write 30*pi/180");
     check_error("4 m", 3, "missing operator: write 4*m");  // a parameter
+    check_error("2 min(q, 1)", 3, "missing operator: write 2*min");
     check_error("m(q + 1)", 2, "missing operator: write m*(");
     check_error("(q)(q)", 4, "missing operator: write )*(");
     check_error("2e", 2, "missing operator: write 2*e");

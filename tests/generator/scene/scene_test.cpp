@@ -602,10 +602,12 @@ TEST_CASE("forces act on coordinates") {
 
 TEST_CASE("forces act along definitions, by their work") {
     const std::string pair =
-        "lagrangian = \"(x'^2 + y'^2)/2 + 0*(r + s[1] + w + T + one)\"\n[coordinates]\nx = { position = 1, velocity = "
+        "lagrangian = \"(x'^2 + y'^2)/2 + 0*(r + s[1] + w + T + one + mixed)\"\n[coordinates]\nx = { position = 1, "
+        "velocity = "
         "0 }\n"
         "y = { position = 2, velocity = 0 }\n[run]\nstep = 0.1\nuntil = 1\n[definitions]\n"
-        "r = \"sqrt(x^2 + y^2)\"\n\"s[i]\" = \"x + i*y\"\nw = \"x*y'\"\nT = \"x'^2\"\none = \"x'^2/x'^2\"\n";
+        "r = \"sqrt(x^2 + y^2)\"\n\"s[i]\" = \"x + i*y\"\nw = \"x*y'\"\nT = \"x'^2\"\none = \"x'^2/x'^2\"\nmixed = \"x "
+        "+ y'\"\n";
     const auto forces = [&](const std::string& lines) {
         const Scene scene = read(pair + "[forces]\n" + lines);
         return std::vector<GiNaC::ex>{scene.coordinates[0].force, scene.coordinates[1].force,
@@ -623,12 +625,14 @@ TEST_CASE("forces act along definitions, by their work") {
     CHECK(power[0].is_zero());
     CHECK(is(power[1], GiNaC::pow(power[2], 2) * power[4]));
     const auto refused = [&](const std::string& line, int column, const std::string& message) {
-        check_error_in(pair + "[forces]\n" + line, {15, column}, message);
+        check_error_in(pair + "[forces]\n" + line, {16, column}, message);
     };
     refused("\"s[i]\" = 1", 2, "s is a definition: write one line for each of its elements, such as \"s[1]\" =");
     refused("T = 1", 1, "T is not linear in the velocities, so no force acts along it");
+    refused("mixed = 1", 1,
+            "mixed is no rate: it holds x without a velocity; write two lines, one for its rate and one for the rest");
     refused("one = 1", 1, "one holds no coordinate, so no force acts along it");
-    refused("r = \"q\"", 6, "unknown name 'q' in the force on r; declared: T, one, r, s[i], w, x, x', y, y'.");
+    refused("r = \"q\"", 6, "unknown name 'q' in the force on r; declared: T, mixed, one, r, s[i], w, x, x', y, y'.");
 }
 
 TEST_CASE("the method is Lobatto's or Gauss's") {
