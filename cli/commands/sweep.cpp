@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 
 #include "analysis/sweep/tally.hpp"
 #include "analysis/sweep/warnings.hpp"
@@ -228,22 +229,28 @@ void sweep(const SweepOptions& options) {
         results.table->flush();
         throw;
     }
-    results.table->finish();
+    // What was interrupted takes no earlier table's place.
+    const bool is_kept_apart = times.interrupted && !is_stream && std::filesystem::exists(path);
+    if (is_kept_apart)
+        results.table->flush();
+    else
+        results.table->finish();
+    const std::string written = is_kept_apart ? path + ".partial" : path;
 
     const SweepTally& tally = results.tally;
     for (std::string& warning : warnings_of(*study, tally.worst_error())) warnings.push_back(std::move(warning));
     for (const std::string& warning : warnings) tell("lobatto: warning: {}.\n", warning);
     const std::int64_t asked = shard.last() - shard.first();
     if (options.json)
-        fmt::print("{}", json_of_sweep(*study, tally, times, {asked, path, results.table->rows(), warnings}));
+        fmt::print("{}", json_of_sweep(*study, tally, times, {asked, written, results.table->rows(), warnings}));
     if (!quiet) {
         print_sweep(*study, tally, times, asked);
-        print_row("table", fmt::format("{}, {}", path, counted(results.table->rows(), "row", "rows")));
+        print_row("table", fmt::format("{}, {}", written, counted(results.table->rows(), "row", "rows")));
         print_sweep_notes(*study);
     }
     if (times.interrupted) {
-        tell("lobatto: interrupted after {} of {} trajectories; what was computed is in {}.\n", tally.trajectories(),
-             asked, path);
+        tell("lobatto: interrupted after {} of {} trajectories; what was computed is in {}{}.\n", tally.trajectories(),
+             asked, written, is_kept_apart ? fmt::format(", and the earlier {} stays", path) : "");
         if (tally.failed() > 0) tell("{}\n", failures_text(*study, tally));
         throw ExitCode{interrupted_exit};
     }
