@@ -130,14 +130,16 @@ Pace pace_at(const LoadedStepper<double>& stepper, Linearisation& linearisation,
     return pace;
 }
 
-// Steps beyond the first limit of the method may throw the motion far away. What follows says nothing of it.
-void leave_out_what_is_thrown(const StabilityReport& report, Linearisation& linearisation, std::vector<State>& states) {
-    if (report.member.limits.empty()) return;
+// Steps beyond the first limit of the method may throw the motion far away. What follows says nothing of it. From when
+// on it was left out.
+std::optional<double> leave_out_what_is_thrown(const StabilityReport& report, Linearisation& linearisation,
+                                               std::vector<State>& states) {
+    if (report.member.limits.empty()) return std::nullopt;
     const double limit = report.member.limits.front().approximation(20).to_double();
     const auto size = [](const State& state) { return state.q.cwiseAbs().maxCoeff(); };
     double extent = size(states.front());
     const auto goes_far = [&](const State& state) { return !(size(state) <= thrown * extent); };
-    if (std::none_of(states.begin(), states.end(), goes_far)) return;
+    if (std::none_of(states.begin(), states.end(), goes_far)) return std::nullopt;
     LoadedStepper<double> stepper(report.kernel);
     stepper.prepare(report.parameters, report.step);
     for (const State& state : states) {
@@ -150,9 +152,13 @@ void leave_out_what_is_thrown(const StabilityReport& report, Linearisation& line
             const double turns = omega * (later.time - from);
             return !(size(later) <= thrown * extent * (1 + turns * turns));
         };
-        states.erase(std::find_if(states.begin(), states.end(), is_thrown), states.end());
-        return;
+        const auto first = std::find_if(states.begin(), states.end(), is_thrown);
+        if (first == states.end()) return std::nullopt;
+        const double time = first->time;
+        states.erase(first, states.end());
+        return time;
     }
+    return std::nullopt;
 }
 
 // Into how many parts a step of this h omega is divided to stand for the motion itself: those of methods with a limit
@@ -322,7 +328,7 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides) {
     request.steps = std::min(steps, most_steps / system.n);
     std::int64_t done = 0;
     std::vector<State> states = states_along(report, request, done);
-    leave_out_what_is_thrown(report, linearisation, states);
+    const std::optional<double> thrown_at = leave_out_what_is_thrown(report, linearisation, states);
     if (system.autonomous && system.n <= static_cast<int>(most_for_eigenvalues)) {
         std::vector<VectorXd> starts{start};
         for (std::size_t i = 0; i < most_starts; ++i) starts.push_back(states[i * states.size() / most_starts].q);
@@ -332,6 +338,7 @@ StabilityReport stability_report(Scene scene, const Overrides& overrides) {
                 point_report(report, equilibrium.system, equilibrium.q, linearisation.free_directions(equilibrium.q)));
     }
     report.trajectory = trajectory_report(report, linearisation, states);
+    report.trajectory->thrown_at = thrown_at;
     report.trajectory->steps = steps;
     report.trajectory->most_steps = request.steps;
     report.trajectory->steps_done = done;

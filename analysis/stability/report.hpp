@@ -41,6 +41,7 @@ struct PointReport {
 struct TrajectoryReport {
     std::int64_t steps = 0, most_steps = 0, steps_done = 0;      // of the scene; run at most; run
     std::int64_t states = 0, frequencies_at = 0, looked_at = 0;  // kept; with known frequencies; with eigenvalues
+    std::optional<double> thrown_at;            // from then on states are left out: the step throws the motion away
     double largest_z = 0, largest_z_time = 0;   // h^2 times the largest squared frequency; 0: nothing oscillates
     std::int64_t parting = 0;                   // steps with an eigenvalue above 1, of those looked at
     double rate = 0, exact_rate = 0, time = 0;  // the largest ln |eigenvalue| of a step; of the motion there; when

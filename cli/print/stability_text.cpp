@@ -152,6 +152,9 @@ std::string trajectory_text(const StabilityReport& report) {
         : motion.steps_done == motion.most_steps
             ? fmt::format("the first {} of {} steps, as many as this command takes", motion.steps_done, motion.steps)
             : fmt::format("it stops after {} of {} steps; lobatto run says why", motion.steps_done, motion.steps));
+    if (motion.thrown_at)
+        text += fmt::format("  from t = {:.6g} on left out: there the step has thrown the motion away\n",
+                            *motion.thrown_at);
     if (motion.largest_z > 0) {
         text += fmt::format("  stiffest at t = {:.6g}: h*omega = {:.6g}", motion.largest_z_time,
                             std::sqrt(motion.largest_z));

@@ -23,13 +23,13 @@ void SystemReader::read_forces() {
     for (const Entry& entry : table_of(source_, *section, "[forces] with lines such as x = \"-c*x'\"")) {
         const Scope in_key{&names_, "[forces]", true, {}};
         const Text key = text_of_key(entry);
-        const Subject subject = parse_subject(source_, key, in_key);
-        Scope scope{&names_, "the force on " + entry.key, true, {}};
-        if (const auto name = names_.all.find(subject.name.text);
+        if (const auto name = names_.all.find(entry.key.substr(0, entry.key.find('[')));
             name != names_.all.end() && name->second.role == Name::Role::definition) {
-            add_force_along(subject, entry, scope);
+            add_force_along(name->first, entry, {&names_, "the force on " + entry.key, true, {}});
             continue;
         }
+        const Subject subject = parse_subject(source_, key, in_key);
+        Scope scope{&names_, "the force on " + entry.key, true, {}};
         const Group& group = group_of(subject);
         long first = 1, last = static_cast<long>(group.count);
         if (!subject.indices.empty()) {
@@ -54,14 +54,10 @@ void SystemReader::read_forces() {
 
 // (D66) By virtual work: what moves r by dr moves the coordinates by dq, so the force on q_k is F dr/dq_k. Of a rate w,
 // F w is its power, and the force on q_k is F dw/dq_k'.
-void SystemReader::add_force_along(const Subject& subject, const Entry& entry, const Scope& scope) {
-    const std::string name(subject.name.text);
-    if (!subject.indices.empty())
-        fail(subject.name.at, fmt::format("{0} is a definition: write one line for each of its elements, such as "
-                                          "\"{0}[1]\" =",
-                                          name));
+void SystemReader::add_force_along(const std::string& name, const Entry& entry, const Scope& scope) {
     const Text& key = keys_.emplace_back(text_of_key(entry));
-    const Scope in_key{&names_, entry.key, true, {}};
+    const Position at = key.at.front();
+    const Scope in_key{&names_, fmt::format("the element {} (one line for each)", entry.key), true, {}};
     const Operand along = evaluate(source_, parse_formula(source_, key, in_key), in_key);
     const Operand force = evaluate(source_, parse_formula(source_, formula_of(source_, entry), scope), scope);
     const Arithmetic arithmetic(scope.formula, names_.work);
@@ -71,9 +67,9 @@ void SystemReader::add_force_along(const Subject& subject, const Entry& entry, c
         const GiNaC::exset held = symbols_of(along.expression.subs(at_rest));
         for (const Coordinate& coordinate : scene_.coordinates)
             if (held.count(coordinate.position) > 0)
-                fail(subject.name.at, fmt::format("{} is no rate: it holds {} without a velocity; write two lines, one "
-                                                  "for its rate and one for the rest",
-                                                  name, coordinate.written));
+                fail(at, fmt::format("{} is no rate: it holds {} without a velocity; write two lines, one "
+                                     "for its rate and one for the rest",
+                                     name, coordinate.written));
     }
     bool acts = false;
     for (Coordinate& coordinate : scene_.coordinates) {
@@ -81,7 +77,7 @@ void SystemReader::add_force_along(const Subject& subject, const Entry& entry, c
         if (slope.is_zero()) continue;
         acts = true;
         if (along.velocities && holds_velocity(slope))
-            fail(subject.name.at, fmt::format("{} is not linear in the velocities, so no force acts along it", name));
+            fail(at, fmt::format("{} is not linear in the velocities, so no force acts along it", name));
         if (coordinate.force.is_zero()) coordinate.force_at = entry.value.at;
         try {
             coordinate.force += arithmetic.multiply(force, operand_of(slope)).expression;
@@ -89,7 +85,7 @@ void SystemReader::add_force_along(const Subject& subject, const Entry& entry, c
             fail(entry.value.at, refusal.what());
         }
     }
-    if (!acts) fail(subject.name.at, fmt::format("{} holds no coordinate, so no force acts along it", name));
+    if (!acts) fail(at, fmt::format("{} holds no coordinate, so no force acts along it", name));
 }
 
 bool SystemReader::holds_velocity(const ex& expression) const {

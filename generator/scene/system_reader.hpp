@@ -80,7 +80,7 @@ private:
     void read_definitions();
     void read_lagrangian();
     void read_forces();
-    void add_force_along(const Subject& subject, const Entry& entry, const Scope& scope);
+    void add_force_along(const std::string& name, const Entry& entry, const Scope& scope);
     bool holds_velocity(const GiNaC::ex& expression) const;
     void read_constraints();
     void read_constraint(const Entry& entry);

@@ -139,6 +139,7 @@ TEST_CASE("places to which a step throws the motion tell nothing of it") {
     CHECK(test::contains(done.out, "About the equilibrium r = 0, q = 0, h = 0.005:"));
     CHECK(done.out.find("e+") == std::string::npos);  // once: equilibria at 1e18, with the rounding of cos there
     CHECK(test::contains(done.out, "the motion itself 1"));
+    CHECK(test::contains(done.out, " on left out: there the step has thrown the motion away\n"));
 }
 
 TEST_CASE("velocities that couple, time, singular places and no equilibrium are each said in words") {

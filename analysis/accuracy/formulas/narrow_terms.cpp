@@ -48,8 +48,8 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
     bool is_kinetic = false;
     const auto add = [&](Kind kind, const ex& u) {
         if (terms_.size() == most_terms) return;
-        // Near the speed of light 1 - v^2 is small, and where the way is not that of the motion, smaller: but a mass
-        // that grows with the velocity hinders nothing.
+        // Near the speed of light 1 - v^2 is small, and smaller on a way that is not the motion's. It is no pole of any
+        // force.
         const auto holds = [&](const GiNaC::symbol& v) { return u.has(v); };
         if (is_kinetic && std::any_of(system.v.begin(), system.v.end(), holds)) return;
         if (!known.insert(u).second) return;

@@ -602,12 +602,10 @@ TEST_CASE("forces act on coordinates") {
 
 TEST_CASE("forces act along definitions, by their work") {
     const std::string pair =
-        "lagrangian = \"(x'^2 + y'^2)/2 + 0*(r + s[1] + w + T + one + mixed)\"\n[coordinates]\nx = { position = 1, "
-        "velocity = "
-        "0 }\n"
-        "y = { position = 2, velocity = 0 }\n[run]\nstep = 0.1\nuntil = 1\n[definitions]\n"
-        "r = \"sqrt(x^2 + y^2)\"\n\"s[i]\" = \"x + i*y\"\nw = \"x*y'\"\nT = \"x'^2\"\none = \"x'^2/x'^2\"\nmixed = \"x "
-        "+ y'\"\n";
+        "lagrangian = \"(x'^2 + y'^2)/2 + 0*(r + s[1] + w + T + one + mixed + d[1,1])\"\n[coordinates]\n"
+        "x = { position = 1, velocity = 0 }\ny = { position = 2, velocity = 0 }\n[run]\nstep = 0.1\nuntil = 1\n"
+        "[definitions]\nr = \"sqrt(x^2 + y^2)\"\n\"s[i]\" = \"x + i*y\"\nw = \"x*y'\"\nT = \"x'^2\"\n"
+        "one = \"x'^2/x'^2\"\nmixed = \"x + y'\"\n\"d[i,j]\" = \"i*x + j*y\"\n";
     const auto forces = [&](const std::string& lines) {
         const Scene scene = read(pair + "[forces]\n" + lines);
         return std::vector<GiNaC::ex>{scene.coordinates[0].force, scene.coordinates[1].force,
@@ -621,18 +619,24 @@ TEST_CASE("forces act along definitions, by their work") {
     const auto sum = forces("\"s[3]\" = \"y\"\ny = 1");
     CHECK(is(sum[0], sum[3]));
     CHECK(is(sum[1], 3 * sum[3] + 1));
+    const auto two = forces("\"d[1,2]\" = 3");
+    CHECK(is(two[0], 3));
+    CHECK(is(two[1], 6));
     const auto power = forces("w = \"w\"");
     CHECK(power[0].is_zero());
     CHECK(is(power[1], GiNaC::pow(power[2], 2) * power[4]));
     const auto refused = [&](const std::string& line, int column, const std::string& message) {
-        check_error_in(pair + "[forces]\n" + line, {16, column}, message);
+        check_error_in(pair + "[forces]\n" + line, {17, column}, message);
     };
-    refused("\"s[i]\" = 1", 2, "s is a definition: write one line for each of its elements, such as \"s[1]\" =");
+    refused("\"s[i]\" = 1", 4,
+            "unknown name 'i' in the element s[i] (one line for each); declared: T, d[i,j], mixed, one, r, s[i], w, x, "
+            "x', y, y'.");
     refused("T = 1", 1, "T is not linear in the velocities, so no force acts along it");
     refused("mixed = 1", 1,
             "mixed is no rate: it holds x without a velocity; write two lines, one for its rate and one for the rest");
     refused("one = 1", 1, "one holds no coordinate, so no force acts along it");
-    refused("r = \"q\"", 6, "unknown name 'q' in the force on r; declared: T, mixed, one, r, s[i], w, x, x', y, y'.");
+    refused("r = \"q\"", 6,
+            "unknown name 'q' in the force on r; declared: T, d[i,j], mixed, one, r, s[i], w, x, x', y, y'.");
 }
 
 TEST_CASE("the method is Lobatto's or Gauss's") {
