@@ -287,7 +287,7 @@ class Chart {
         const step = [1, 2, 5, 10].map(s => s * power).find(s => s >= rough * 0.999), result = [];
         for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step && result.length <= 4 * count; ++k)
             result.push([k * step, Chart.number(k * step, step)]);
-        return result;
+        return result.length < 2 && high > low && count < 100 ? Chart.ticks(low, high, 2 * count) : result;  // one tells no scale
     }
     scales(context, width, height) {
         let low = Infinity, high = -Infinity, left = 0, right = end;
