@@ -183,6 +183,8 @@ class Sweep(_Rows):
         if self._states is None:
             raise InputError("this sweep kept the last states alone; every=10 keeps each tenth too")
         first = self._states["first"]
+        if index < 0:  # from the end
+            index += len(self)
         if not 0 <= index < len(self):
             raise IndexError(f"there is no trajectory {index}; there are {len(self)}, counted from 0")
         return States(self.coordinates, self._states, slice(int(first[index]), int(first[index + 1])))

@@ -313,6 +313,7 @@ def test_a_sweep_keeps_states_on_the_way(pendulum):
     states = sweep.states(1)
     assert numpy.array_equal(states.t, run.t) and len(states) == 4  # 20 steps: 0, 8, 16, 20
     assert states["q"][0] == 1 and states["p_q"][-1] == sweep.p[1, 0] and states.q[-1, 0] == sweep.q[1, 0]
+    assert numpy.array_equal(sweep.states(-1).q, states.q)
     with pytest.raises(IndexError, match="there are 2"):
         sweep.states(2)
     with pytest.raises(lobatto.InputError, match="every=10"):
