@@ -111,10 +111,26 @@ bool SweepWatch::run_again(const EnsembleTrajectory& trajectory) {
     again.arrivals.keeps_chain = again.arrivals.interval != 0;
     again.interrupted = request_.interrupted;
     EnergyWatch watch(outline_, *alone_);
-    again.sink = [&](const Records& records) { watch.observe(records); };
+    // The mean kinetic energy while it is as right as that in lanes.
+    double sum = 0, energy_start = 0;
+    std::int64_t states = 0;
+    again.sink = [&](const Records& records) {
+        watch.observe(records);
+        for (std::int64_t i = 0; i < records.count; ++i) {
+            if (states == 0) energy_start = records.energy[i];
+            if (!(std::fabs(records.energy[i] - energy_start) <= trajectory.energy_error_largest)) continue;
+            const double* const row = records.rows + i * records.columns;
+            const double* const middle = row + 1 + start_.q.size();
+            sum += kinetic_energy(stepper_, row[0], {row + 1, middle}, {middle, middle + p_.size()});
+            ++states;
+        }
+    };
     const TrajectoryResult result = integrate(*alone_, again);
-    // A trajectory that goes on in lanes, with such an error, where alone it cannot, has left the motion, too.
-    return !result.interrupted && (result.status != LOBATTO_OK || !watch.departure(outline_, *alone_, again).empty());
+    if (result.interrupted) return false;
+    // It may go on in lanes where alone it cannot, for the iterations of a step begin elsewhere.
+    if (result.status != LOBATTO_OK)
+        return !(trajectory.energy_error_largest < doubtful * sum / static_cast<double>(states));
+    return !watch.departure(outline_, *alone_, again).empty();
 }
 
 }  // namespace lobatto

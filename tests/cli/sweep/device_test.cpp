@@ -80,8 +80,8 @@ std::string stopped_scene(const test::SweepFolder& place, const std::string& nam
 }
 
 // The tables agree to rounding: in each column to this part of its largest number, and of the energy.
-void check_to_rounding(const std::string& scene, const std::vector<std::string>& words, double part,
-                       double energy = 0) {
+void check_to_rounding(const std::string& scene, const std::vector<std::string>& words, double part, double energy = 0,
+                       int exit_code = 0) {
     CAPTURE(scene);
     CAPTURE(fmt::format("{}", fmt::join(words, " ")));
     const test::SweepFolder place;
@@ -90,7 +90,7 @@ void check_to_rounding(const std::string& scene, const std::vector<std::string>&
         std::vector<std::string> all{"sweep", scene, "--quiet", "--device", device, "-o", place.file(device + ".csv")};
         all.insert(all.end(), words.begin(), words.end());
         const test::Finished end = place.lobatto(all);
-        REQUIRE_MESSAGE(end.exit_code == 0, end.err);
+        REQUIRE_MESSAGE(end.exit_code == exit_code, end.err);
         std::istringstream lines(test::read_file(place.file(device + ".csv")));
         auto& of_device = columns.emplace_back();
         bool is_head = true;
@@ -191,7 +191,7 @@ TEST_SUITE("slow") {
         // Steps that the processor takes by Newton's iteration, some of which fail, between stops.
         const std::string failing = stopped_scene(place, "double_pendulum", R"(["b = pi", "b = -pi"])");
         CHECK(stopped_rows(check_same_bytes(
-                  failing, {"--vary", "a=0.1:3:70", "--step", "0.3", "--steps", "200", "--unmeasured"})) > 5);
+                  failing, {"--vary", "a=0.1:3:70", "--step", "0.3", "--steps", "200", "--unmeasured"}, 3)) > 5);
     }
 
     TEST_CASE(
@@ -223,7 +223,7 @@ TEST_SUITE("slow") {
         check_to_rounding(scene_file("double_pendulum"),
                           {"--vary", "a=0.1:2:70", "--step", "0.3", "--steps", "200", "--unmeasured", "--keep",
                            "count(a = 0), max(H), mean(a'), first(b = pi)"},
-                          1e-13);
+                          1e-13, 0, 3);  // the energy of some is off
         check_to_rounding(scene_file("flips"),
                           {"--vary", "a=-3:3:12", "--vary", "b=-3:3:12", "--until", "40", "--beyond-horizon",
                            "--unmeasured", "--keep", "max(H), count(a = 0), mean(b^2)"},

@@ -255,9 +255,9 @@ TEST_CASE("each way to stop has its own explanation") {
           where +
               "the iteration for the positions inside the step did not converge: its last increment was 0.3 of "
               "the displacement within the step. The step is too "
-              "long for the forces met there, or the motion runs into a singularity of the potential, or to a "
-              "place where a mass vanishes. Try a smaller "
-              "step, such as h = 0.25, or start elsewhere.");
+              "long for the forces met there, or the motion runs into a singularity of the potential, to a place where "
+              "a mass vanishes, or away to infinity. Try a smaller step, such as h = 0.25, an earlier end, or start "
+              "elsewhere.");
     result.status = LOBATTO_NOT_FINITE;
     CHECK(explain_stop(result, request) ==
           where +
