@@ -7,7 +7,6 @@
 #include <cmath>
 #include <memory>
 
-#include "analysis/tape.hpp"
 #include "generator/mechanics/algebra/sample.hpp"
 
 namespace lobatto {
@@ -23,36 +22,6 @@ std::vector<GiNaC::symbol> motion_of(const Scene& scene) {
     for (const Coordinate& coordinate : scene.coordinates) all.push_back(coordinate.velocity);
     return all;
 }
-
-class InDoubles {
-public:
-    InDoubles(const Scene& scene, const std::vector<double>& parameters)
-        : parameters_(parameters.size()), variables_(parameters) {
-        std::vector<GiNaC::symbol> symbols;
-        for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
-        for (const GiNaC::symbol& symbol : motion_of(scene)) symbols.push_back(symbol);
-        variables_.resize(symbols.size());
-        for (const Column& column : scene.outputs.columns) {
-            const std::optional<Tape> tape = Tape::of(scene.along_motion(column.value), symbols);
-            if (!tape)
-                throw InputError(
-                    fmt::format("{}: the column {} cannot be evaluated along a trajectory", scene.path, column.name));
-            tapes_.push_back(*tape);
-        }
-    }
-
-    void operator()(const Parts& time, const Parts& q, const Parts& velocity, Parts& values) {
-        auto at = variables_.begin() + static_cast<std::ptrdiff_t>(parameters_);
-        for (const Parts* part : {&time, &q, &velocity}) at = std::copy(part->begin(), part->end(), at);
-        std::transform(tapes_.begin(), tapes_.end(), values.begin(),
-                       [&](const Tape& tape) { return tape(variables_); });
-    }
-
-private:
-    std::size_t parameters_;
-    std::vector<double> variables_;
-    std::vector<Tape> tapes_;
-};
 
 // Of numbers with more digits, each a sum of `parts` doubles.
 class InManyDigits {
@@ -108,6 +77,28 @@ private:
 
 }  // namespace
 
+ColumnFormulas::ColumnFormulas(const Scene& scene) : coordinates_(std::ssize(scene.coordinates)) {
+    std::vector<GiNaC::symbol> symbols;
+    for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
+    for (const GiNaC::symbol& symbol : motion_of(scene)) symbols.push_back(symbol);
+    for (const Column& column : scene.outputs.columns) {
+        const std::optional<Tape> tape = Tape::of(scene.along_motion(column.value), symbols);
+        if (!tape)
+            throw InputError(
+                fmt::format("{}: the column {} cannot be evaluated along a trajectory", scene.path, column.name));
+        tapes_.push_back(*tape);
+    }
+}
+
+void ColumnFormulas::evaluate(const std::vector<double>& parameters, double time, const std::vector<double>& q,
+                              const std::vector<double>& velocity, double* values) const {
+    std::vector<double> variables = parameters;
+    variables.push_back(time);
+    for (const std::vector<double>* part : {&q, &velocity})
+        variables.insert(variables.end(), part->begin(), part->begin() + coordinates_);
+    for (const Tape& tape : tapes_) *values++ = tape(variables);
+}
+
 std::vector<std::pair<std::string, std::string>> names_beside(const Scene& scene) {
     std::vector<std::pair<std::string, std::string>> names;
     if (scene.outputs.multipliers)
@@ -126,7 +117,12 @@ TrajectoryRequest::Formulas columns_of(const Scene& scene, const TrajectoryReque
                                        std::recursive_mutex* algebra) {
     if (scene.outputs.columns.empty()) return {};
     const bool is_double = request.whole_q.empty();
-    if (is_double) return {scene.outputs.columns.size(), InDoubles(scene, request.parameters)};
+    if (is_double)
+        return {scene.outputs.columns.size(),
+                [formulas = ColumnFormulas(scene), parameters = request.parameters](
+                    const Parts& time, const Parts& q, const Parts& velocity, Parts& values) {
+                    formulas.evaluate(parameters, time.front(), q, velocity, values.data());
+                }};
     const auto formulas = std::make_shared<InManyDigits>(scene, request.whole_parameters, algebra);
     return {scene.outputs.columns.size(), [formulas](const Parts& time, const Parts& q, const Parts& velocity,
                                                      Parts& values) { (*formulas)(time, q, velocity, values); }};

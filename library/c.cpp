@@ -12,7 +12,7 @@ namespace api = lobatto::api;
 struct lobatto_integrator : Handle<api::Stepper> {
     std::vector<api::EventHit> hits;  // taken last, and as C sees them
     std::vector<lobatto_event> events;
-    std::vector<double> multipliers;
+    std::vector<double> multipliers, columns;
 };
 struct lobatto_trajectory : Handle<api::Trajectory> {
     std::vector<lobatto_event> events;
@@ -228,6 +228,28 @@ int lobatto_integrator_multipliers(lobatto_integrator* integrator, const double*
         integrator->multipliers = stepper.multipliers();
         *multipliers = api::data(integrator->multipliers);
         *count = integrator->multipliers.size();
+    });
+}
+int lobatto_integrator_columns(lobatto_integrator* integrator, const double** columns, size_t* count) {
+    if (columns != nullptr) *columns = nullptr;
+    if (count != nullptr) *count = 0;
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(columns, "columns");
+        require(count, "count");
+        integrator->columns = stepper.columns();
+        *columns = api::data(integrator->columns);
+        *count = integrator->columns.size();
+    });
+}
+const char* lobatto_integrator_column(const lobatto_integrator* integrator, size_t index) {
+    return api::read(integrator, nullptr, [&](const auto& value) { return api::text(value.column_names(), index); });
+}
+int lobatto_integrator_sensitivity(lobatto_integrator* integrator, const char* parameter, double* derivative) {
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(parameter, "parameter");
+        require(derivative, "derivative");
+        const std::vector<double> all = stepper.sensitivity(parameter);
+        std::copy(all.begin(), all.end(), derivative);
     });
 }
 size_t lobatto_integrator_coordinates(const lobatto_integrator* integrator) {

@@ -26,11 +26,11 @@ struct Lanes {
 Scene scene_for(const Scene& scene, const Settings& settings) {
     return in_algebra([&] {
         const lobatto::Scene chosen = with_method(scene, settings);
-        if (chosen.clock || !chosen.run.stops.empty())
+        if (chosen.clock || chosen.may_end_early())
             throw InputError(fmt::format(
                 "{}: the trajectories of an ensemble are all at one time, but {}; leave it out, or take sweep()",
                 chosen.path,
-                !chosen.clock               ? "the scene has stops"
+                !chosen.clock               ? chosen.run.stops.empty() ? "a wall has rest" : "the scene has stops"
                 : scene.parts().scene.clock ? "the scene has a clock"
                                             : "the settings ask for a clock"));
         if (chosen.method.numbers != Precision::double_)

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "analysis/accuracy/formulas/domains.hpp"
+#include "analysis/columns.hpp"
 #include "analysis/kernel/kernel_of.hpp"
 #include "analysis/method_choice.hpp"
 #include "analysis/motion.hpp"
@@ -46,6 +47,8 @@ struct Kernel::Parts {
     std::vector<std::string> events;
     std::vector<Required> required;
     Domains domains;  // of the scene's formulas
+    ColumnFormulas columns;
+    std::vector<std::string> column_names;
 };
 
 // Formulas are not made for several threads.

@@ -81,7 +81,7 @@ void refuse_too_much(const OpenedRun& run) {
 
 Trajectory run(const Scene& scene, const RunOptions& options) {
     OpenedRun run(scene, options);
-    if (run.scene().run.stops.empty()) guarded([&] { refuse_too_much(run); });
+    if (!run.scene().may_end_early()) guarded([&] { refuse_too_much(run); });
     Trajectory trajectory = in_algebra([&] { return begun(run); });
     volatile int is_interrupted = 0;
     OpenedRun::Listeners listeners;

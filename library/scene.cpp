@@ -106,6 +106,7 @@ std::size_t index_of(const std::vector<Variable>& parameters, const std::string&
     if (found != parameters.end()) return static_cast<std::size_t>(found - parameters.begin());
     std::vector<std::string> names;
     for (const Variable& parameter : parameters) names.push_back(parameter.name);
+    if (names.empty()) throw InputError(fmt::format("unknown parameter '{}': the scene declares none", name));
     throw InputError(
         fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
 }

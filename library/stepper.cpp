@@ -42,6 +42,9 @@ const std::vector<Variable>& Kernel::inputs() const {
 const std::vector<std::string>& Kernel::events() const {
     return parts_->events;
 }
+const std::vector<std::string>& Kernel::column_names() const {
+    return parts_->column_names;
+}
 
 std::vector<Required> required_of(const lobatto::Scene& scene) {
     std::vector<GiNaC::symbol> symbols;
@@ -52,11 +55,17 @@ std::vector<Required> required_of(const lobatto::Scene& scene) {
     return all;
 }
 
+namespace {
+
+constexpr double least_parameter = 1e-300;  // other than 0
+
+}  // namespace
+
 void check_change(const std::vector<Required>& required, const std::vector<double>& parameters, std::size_t first,
                   std::size_t count) {
-    constexpr double least = 1e-300, most = 1e300;
+    constexpr double most = 1e300;
     for (std::size_t i = first; i < first + count; ++i)
-        if (const double size = std::fabs(parameters[i]); !(size == 0 || (size >= least && size <= most)))
+        if (const double size = std::fabs(parameters[i]); !(size == 0 || (size >= least_parameter && size <= most)))
             throw InputError(fmt::format(
                 "{} is no value of a parameter: it must be 0, or of a size between 1e-300 and 1e300", parameters[i]));
     for (const Required& one : required) {
@@ -64,6 +73,16 @@ void check_change(const std::vector<Required>& required, const std::vector<doubl
         if (!(value > 0 || (one.may_vanish && value == 0))) throw InputError(one.complaint);
     }
 }
+
+namespace {
+
+std::vector<std::string> column_names_of(const lobatto::Scene& scene) {
+    std::vector<std::string> names;
+    for (const Column& column : scene.outputs.columns) names.push_back(column.name);
+    return names;
+}
+
+}  // namespace
 
 Kernel compile(const Scene& scene, const Settings& settings) {
     return in_algebra([&] {
@@ -84,7 +103,8 @@ Kernel compile(const Scene& scene, const Settings& settings) {
         const TrajectoryRequest start = request_of(changed, steps.count, stepper);
         return Kernel(shared_in_algebra(new const Kernel::Parts{
             changed, kernel, derived.source.digest, start, coordinates_of(changed), parameters_of(changed),
-            inputs_of(changed), events_of(changed), required_of(changed), Domains(changed, derived.outline.system)}));
+            inputs_of(changed), events_of(changed), required_of(changed), Domains(changed, derived.outline.system),
+            ColumnFormulas(changed), column_names_of(changed)}));
     });
 }
 
@@ -101,6 +121,7 @@ struct Stepper::Parts {
     // With a clock: where the scene's times are counted from, and a stop that the chain has met beyond the time now.
     double origin = 0;
     std::optional<EventHit> stop_ahead;
+    std::optional<int> rests_on;   // the wall, by its number among the events
     std::int64_t chain_steps = 0;  // since the start
     std::vector<double> chain;     // t, q, p at the end of the last of them
 
@@ -183,6 +204,7 @@ struct Stepper::Parts {
         if (is_clocked()) stepper.state(time, q, p);  // where the time is a coordinate, the kernel sets it
         origin = time;
         stop_ahead.reset();
+        rests_on.reset();
         std::erase_if(found, [&](const EventHit& hit) { return time < hit.t; });
     }
 
@@ -191,27 +213,35 @@ struct Stepper::Parts {
         const std::vector<double> before = parameters;
         std::vector<double> after = before;
         std::copy(values.begin(), values.end(), after.begin() + static_cast<std::ptrdiff_t>(first));
-        if (after == before) return;
-        check_change(kernel.parts().required, after, first, values.size());
-        parameters = after;
         const lobatto_kernel& table = stepper.kernel().table();
         const auto begin = static_cast<std::size_t>(table.first_input),
                    end = begin + static_cast<std::size_t>(table.inputs);
         const bool are_inputs = first >= begin && first + values.size() <= end;
+        for (std::size_t i = first; are_inputs && i < first + values.size(); ++i)
+            if (std::fabs(after[i]) < least_parameter) after[i] = 0;  // a control loop that has come to rest
+        if (after == before) return;
+        check_change(kernel.parts().required, after, first, values.size());
+        parameters = after;
         const double step_before = last_step;
         const auto take = [&] {
             last_step = 0;
             if (!are_inputs) return restart();
             if (const lobatto_status status = stepper.set_inputs(parameters); status != LOBATTO_OK) fail(status, {});
         };
-        try {
-            take();
-        } catch (...) {
+        const auto put_back = [&] {
             parameters = before;
             if (are_inputs && table.events > 0)
                 last_step = step_before;  // a kernel that watches has refused them itself
             else
                 restart();
+        };
+        try {
+            take();
+        } catch (const ComputationError& error) {
+            put_back();
+            throw ComputationError(fmt::format("the new value is not taken, the one before stays: {}", error.what()));
+        } catch (...) {
+            put_back();
             throw;
         }
     }
@@ -233,6 +263,10 @@ struct Stepper::Parts {
 
     // Of steps of equal length; with a clock an arrival at a time.
     bool advance(std::int64_t steps, double arrival = 0) {
+        if (rests_on)  // else a loop over steps would never end
+            throw ComputationError(fmt::format(
+                "{}: at t = {:.6g} the motion came to rest on '{}', and a step leads nowhere. Start it elsewhere",
+                kernel.parts().scene.path, time, kernel.parts().events[static_cast<std::size_t>(*rests_on)]));
         lobatto_advance call{};
         call.tolerance = kernel.parts().start.tolerance;
         call.interval = std::numeric_limits<double>::infinity();
@@ -263,7 +297,17 @@ struct Stepper::Parts {
         if (status != LOBATTO_OK) fail(status, call);
         return true;
     }
+    // On a wall the motion may lie where no start is accepted, and goes nowhere.
     bool stop_at(const EventHit& stop) {
+        if (const lobatto::Scene& scene = kernel.parts().scene;
+            static_cast<std::size_t>(stop.kind) >= scene.outputs.events.size() + scene.run.stops.size()) {
+            time = stop.t;
+            q.assign(stop.q.begin(), stop.q.end());
+            p.assign(stop.p.begin(), stop.p.end());
+            last_step = 0;
+            rests_on = stop.kind;
+            return false;
+        }
         go_on_from(stop.t, stop.q, stop.p);
         return false;
     }
@@ -332,8 +376,9 @@ struct Stepper::Parts {
             throw;
         }
         const double rest = std::exchange(step, usual);
+        if (rests_on) stepper = std::move(before);
         if (!goes_on) {
-            restart();
+            if (!rests_on) restart();
             return false;
         }
         inside = stepper;
@@ -487,6 +532,17 @@ std::vector<double> Stepper::tangent() const {
             parts.fail(status, {});
         return T;
     });
+}
+
+const std::vector<std::string>& Stepper::column_names() const {
+    return parts_->kernel.column_names();
+}
+std::vector<double> Stepper::columns() const {
+    const std::vector<double> v = velocity();
+    const Kernel::Parts& known = parts_->kernel.parts();
+    std::vector<double> values(known.columns.count());
+    known.columns.evaluate(parts_->parameters, parts_->time, parts_->q, v, values.data());
+    return values;
 }
 
 double Stepper::parameter(const std::string& name) const {

@@ -164,7 +164,9 @@ Sweep sweep(const Scene& scene, const Starts& starts, const SweepOptions& option
         sweep.interrupted = study->compute(0, count, sink, progress, &is_interrupted).interrupted;
         sweep.warnings = in_algebra([&] {
             std::vector<std::string> warnings = warnings_of(*study, worst);
-            const bool any_ends = std::any_of(sweep.stop.begin(), sweep.stop.end(), [](int stop) { return stop == 0; });
+            bool any_ends = false;
+            for (std::size_t i = 0; i < sweep.stop.size(); ++i)
+                any_ends = any_ends || (sweep.stop[i] == 0 && sweep.status[i] == LOBATTO_OK);
             if (!study->first_setting().steps.reaches_end && !sweep.interrupted && any_ends)
                 warnings.emplace_back(
                     "the end time is not a multiple of the step: the runs end at the last multiple before it");

@@ -56,7 +56,7 @@ StabilityReport stability_of(const Scene& scene, const Settings& settings) {
             "method alone: lobatto stability --splitting {}",
             changed.path, changed.method.points));
     Overrides overrides = overrides_of(settings);
-    if (!changed.run.stops.empty()) {
+    if (changed.may_end_early()) {
         lobatto::Scene with_values = changed;
         apply(overrides, with_values);
         with_values = ending_at_stop(std::move(with_values));

@@ -55,8 +55,8 @@ std::vector<double> vector_of(const Array& array) {
 
 const double* row_of(const Array& array, std::size_t count, const char* what) {
     if (array.ndim() != 1 || static_cast<std::size_t>(array.size()) != count)
-        throw lob::InputError(std::string(what) + " needs " + std::to_string(count) +
-                              " numbers, one for each coordinate");
+        throw lob::InputError(std::string(what) + " is a list of " + std::to_string(count) +
+                              (count == 1 ? " number, such as [1.0]" : " numbers, one for each coordinate"));
     return array.data();
 }
 
@@ -166,6 +166,15 @@ py::object copy_of(const lob::Stepper& stepper) {
 py::object state_at(const lob::Stepper& stepper, double t) {
     auto [q, velocity] = stepper.at(t);
     return py::cast(std::pair(owned(std::move(q)), owned(std::move(velocity))));
+}
+py::dict columns_of(const lob::Stepper& stepper) {
+    py::dict all;
+    const std::vector<double> values = stepper.columns();
+    for (std::size_t i = 0; i < values.size(); ++i) all[py::str(stepper.column_names()[i])] = values[i];
+    return all;
+}
+py::object sensitivity_of(const lob::Stepper& stepper, const std::string& name) {
+    return owned(alone(stepper, &lob::Stepper::sensitivity, name));
 }
 py::object tangent_of(const lob::Stepper& stepper) {
     return owned(stepper.tangent(), static_cast<py::ssize_t>(2 * stepper.coordinates()));
@@ -393,6 +402,14 @@ void add_scene(py::module_& module) {
              [](const lob::Scene& scene) { return "Scene('" + scene.path() + "': " + scene.title() + ")"; });
 }
 
+lob::Stepper stepper_of(const lob::Scene& scene, const py::kwargs& given) {
+    const lob::Settings settings = settings_of(given);
+    return unlocked([&] { return lob::Stepper(lob::compile(scene, settings)); });
+}
+lob::Stepper stepper_of_file(const py::object& path, const py::kwargs& given) {
+    return stepper_of(lob::Scene(py::cast<std::string>(py::module_::import("os").attr("fspath")(path))), given);
+}
+
 void add_stepper(py::module_& module) {
     const auto vector = [](const py::object& self, const double* (lob::Stepper::*function)() const) {
         const auto& stepper = self.cast<const lob::Stepper&>();
@@ -402,11 +419,8 @@ void add_stepper(py::module_& module) {
     Steppers(module, "Stepper",
              "A trajectory that the caller takes forward.\n\n"
              "q and p are read-only views of where the motion is now; copy them to keep them.")
-        .def(py::init([](const lob::Scene& scene, const py::kwargs& given) {
-                 const lob::Settings settings = settings_of(given);
-                 return unlocked([&] { return lob::Stepper(lob::compile(scene, settings)); });
-             }),
-             py::arg("scene"))
+        .def(py::init(&stepper_of), py::arg("scene"))
+        .def(py::init(&stepper_of_file), py::arg("path"))
         .def(
             "step", [](lob::Stepper& stepper) { return alone(stepper, &lob::Stepper::step); },
             "One step. False where a stop of the scene ended the motion.")
@@ -442,6 +456,8 @@ void add_stepper(py::module_& module) {
         .def("parameter", &lob::Stepper::parameter, py::arg("name"))
         .def(
             "copy", [](const lob::Stepper& stepper) { return alone(stepper, &copy_of); }, "A second motion from here.")
+        .def("__copy__", [](const lob::Stepper& stepper) { return alone(stepper, &copy_of); })
+        .def("__deepcopy__", [](const lob::Stepper& stepper, const py::dict&) { return alone(stepper, &copy_of); })
         .def_property_readonly("t", &lob::Stepper::t)
         .def_property_readonly("q", [vector](const py::object& self) { return vector(self, &lob::Stepper::q); })
         .def_property_readonly("p", [vector](const py::object& self) { return vector(self, &lob::Stepper::p); })
@@ -450,17 +466,25 @@ void add_stepper(py::module_& module) {
             "H", &lob::Stepper::energy,
             "The energy; not a number where the scene leaves it out and the motion does not conserve it.")
         .def_property_readonly("multipliers", [](const lob::Stepper& stepper) { return owned(stepper.multipliers()); })
+        .def_property_readonly("columns", &columns_of,
+                               "What follows from the coordinates, by name: eliminated ones and "
+                               "their velocities, rotations and places of bodies.")
         .def_property_readonly("step_size", &lob::Stepper::step_size)
         .def(
             "at", [](const lob::Stepper& stepper, double t) { return alone(stepper, &state_at, t); }, py::arg("t"),
-            "Position and velocity at a time inside the last step, on its own polynomial.")
+            "Position and velocity at a time inside the last step, on its own polynomial: velocities to a lower order "
+            "than "
+            "those of the steps.")
         .def(
             "tangent", [](const lob::Stepper& stepper) { return alone(stepper, &tangent_of); },
             "d(q1, p1)/d(q, p) of the next step, 2n x 2n; with a clock there is none.")
+        .def("sensitivity", &sensitivity_of, py::arg("name"),
+             "d(q1, p1)/d(parameter or input) of the next step, 2n, to about ten digits.")
         .def(
             "take_events", [](lob::Stepper& stepper) { return events_of(stepper.take_events(), stepper.events()); },
             "Events, stops and impacts since the last call: (what, t, q, p); of an impact the momenta after it.")
-        .def_property_readonly("_next_time", &lob::Stepper::next_time)
+        .def_property_readonly("next_time", &lob::Stepper::next_time,
+                               "Where step() leads to, unless a stop comes before it.")
         .def("_states_at", &states_at);
 }
 

@@ -28,16 +28,25 @@ std::string clock_advice(const Scene& scene) {
     return helps ? ", or clock = \"auto\" under [method], whose steps follow close encounters" : "";
 }
 
+// Of steps that became infinite, with a method whose equal steps have a limit of stability.
+std::string gauss_advice(const Scene& scene, lobatto_status status) {
+    const bool has_limit = scene.method.family != Family::gauss && !scene.clock;
+    return status == LOBATTO_NOT_FINITE && has_limit
+               ? ", Gauss's method (--stages 2), which stiffness alone does not make unstable"
+               : "";
+}
+
 // That nothing of the motion is left in the result, unless that was accepted. Empty: something is.
 std::string loss_of(const Scene& scene, const TrajectoryRequest& request, const std::optional<MeasuredError>& error) {
     if (!error || !error->is_lost()) return "";
     if (error->rests)
         return fmt::format(
             "the run rests where it begins, q = {}, p = {}, but a start that differs by rounding leaves it: the "
-            "equilibrium is unstable (`lobatto stability` tells), or the step too long for it. What a motion does that "
-            "begins there is not known. Start elsewhere, or try a smaller step, such as h = {:.6g}, or "
-            "--beyond-horizon, "
-            "where the run shall rest.",
+            "equilibrium is unstable (`lobatto stability` tells), or the step too long for it, or each step changes "
+            "less "
+            "than a last digit. What a motion does that begins there is not known. Start elsewhere, compute in finer "
+            "numbers (--numbers double-double), or try a smaller step, such as h = {:.6g}, or --beyond-horizon, where "
+            "the run shall rest.",
             list_text(request.q), list_text(request.p), request.step / 2);
     const std::string clock = clock_advice(scene);
     const char* const why = error->companion_stopped
@@ -76,7 +85,7 @@ std::vector<std::string> warnings_of(const MeasuredError& error, double wanted, 
 
 // That a run which went to its end has left the motion of its Lagrangian. Empty: it has not.
 std::string departure_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
-                         const RunObservers& observers) {
+                         const RunObservers& observers, bool jumps) {
     if (result.status != LOBATTO_OK || result.interrupted) return "";
     if (const std::vector<double>& row = observers.left_domain; !row.empty()) {
         const auto middle = row.begin() + 1 + std::ssize(result.q);
@@ -87,7 +96,7 @@ std::string departure_of(const PreparedRun& run, const TrajectoryRequest& reques
             row[0], list_text({row.begin() + 1, middle}), list_text({middle, row.end()}),
             observers.domains.text(observers.parameters, row.data()));
     }
-    const std::string departure = observers.energy.departure(run.outline, run.plain, request);
+    const std::string departure = observers.energy.departure(run.outline, run.plain, request, jumps);
     if (run.scene.clock || run.scene.is_cut()) return departure;
     return departure.empty() ? linear_departure(run.outline, run.scene, run.plain, request, result) : departure;
 }
@@ -99,7 +108,8 @@ std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request,
     if (const std::string why = stopped_at_formula(scene, observers.domains, run.plain, request, result); !why.empty())
         return why;
     if (result.status != LOBATTO_OK)
-        return explain_stop(result, request, passing_step(run.plain, request, result), clock_advice(scene));
+        return explain_stop(result, request, passing_step(run.plain, request, result),
+                            gauss_advice(scene, result.status) + clock_advice(scene));
     if (!departure.empty()) return departure;
     if (!scene.outputs.energy || std::isfinite(result.energy_error_largest)) return "";
     if (std::isfinite(result.energy_start))
@@ -162,14 +172,48 @@ bool has_sine_of(const GiNaC::ex& formula, const GiNaC::symbol& x) {
 // A unit is a word, and converts nothing.
 std::vector<std::string> degrees_in_sines(const Scene& scene) {
     std::vector<std::string> texts;
-    for (const Coordinate& coordinate : scene.coordinates) {
-        const bool is_degrees = coordinate.unit == "deg" || coordinate.unit == "degree" ||
-                                coordinate.unit == "degrees" || coordinate.unit == "\u00b0";
-        if (is_degrees && has_sine_of(scene.lagrangian, coordinate.position))
+    const auto look_at = [&](const std::string& name, const std::string& unit, const GiNaC::symbol& symbol,
+                             const char* value) {
+        const bool is_degrees =
+            unit == "deg" || unit == "Deg" || unit == "degree" || unit == "degrees" || unit == "\u00b0";
+        if (is_degrees && has_sine_of(scene.lagrangian, symbol))
             texts.push_back(
                 fmt::format("{0} has the unit {1}, but its sine and cosine take it for radians: units convert "
-                            "nothing. Write the start as 30*pi/180 for 30 degrees, and unit = \"rad\"",
-                            coordinate.written, coordinate.unit));
+                            "nothing. Write the {2} as 30*pi/180 for 30 degrees, and unit = \"rad\"",
+                            name, unit, value));
+    };
+    for (const Coordinate& one : scene.coordinates) look_at(one.written, one.unit, one.position, "start");
+    for (const Parameter& one : scene.parameters) look_at(one.written, one.unit, one.symbol, "value");
+    return texts;
+}
+
+// A kinetic energy that is not positive is allowed. With constant masses it is mostly a sign that was mistaken; others
+// are metrics such as those of relativity.
+std::vector<std::string> negative_masses(const PreparedRun& run, const TrajectoryRequest& request) {
+    std::vector<std::string> texts;
+    LoadedStepper<double> stepper(run.plain);
+    std::vector<double> velocity;
+    const std::vector<GiNaC::symbol> motion = run.outline.system.motion();
+    const auto entries = run.outline.system.momentum_v.entries();
+    const bool is_constant = std::none_of(entries.begin(), entries.end(), [&](const auto& entry) {
+        return std::any_of(motion.begin(), motion.end(), [&](const auto& symbol) { return entry.second.has(symbol); });
+    });
+    if (!is_constant || !run.scene.constraints.empty() ||
+        stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
+        stepper.start(request.time, request.q, request.p) != LOBATTO_OK ||
+        stepper.velocity(request.time, request.q, request.p, velocity) != LOBATTO_OK)
+        return texts;
+    const std::vector<double> momentum = stepper.momentum(request.time, request.q, velocity);
+    for (std::size_t k = 0; k < run.scene.coordinates.size(); ++k) {
+        std::vector<double> faster = velocity;
+        faster[k] += velocity[k] != 0 ? velocity[k] / 1024 : 0x1p-20;
+        const double change = stepper.momentum(request.time, request.q, faster)[k] - momentum[k];
+        if (change * (faster[k] - velocity[k]) < -0x1p-30 * std::fabs(momentum[k] * (faster[k] - velocity[k])))
+            texts.push_back(
+                fmt::format("the mass of {} is negative at the start: its momentum falls as its velocity "
+                            "grows. That is allowed, but mostly a mistaken sign in the Lagrangian",
+                            run.scene.coordinates[k].written));
+        if (!texts.empty()) break;
     }
     return texts;
 }
@@ -205,7 +249,8 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
         verdict.warnings.emplace_back(
             "the error is not measured, because the companion took too long to the first comparison; keep states on "
             "the way (--every)");
-    std::string departure = departure_of(run, request, result, observers);
+    const std::vector<std::string> jumps = jumps_of(scene, request.parameters);
+    std::string departure = departure_of(run, request, result, observers, !jumps.empty());
     if (departure.empty() && !accepts_lost && !scene.run.beyond_horizon)
         departure = loss_of(scene, request, verdict.error);
     if (verdict.error && departure.empty())
@@ -215,8 +260,10 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
         for (const std::string& warning : StepJudge::warnings(
                  observers.judge.judge(run.outline, run.plain, request, result), known_error(run, verdict.error)))
             verdict.warnings.push_back(warning);
-    for (const std::string& jump : jumps_of(scene, request.parameters)) verdict.warnings.push_back(jump);
+    if (const std::string text = observers.walls.text(); !text.empty()) verdict.warnings.push_back(text);
+    for (const std::string& jump : jumps) verdict.warnings.push_back(jump);
     for (const std::string& text : degrees_in_sines(scene)) verdict.warnings.push_back(text);
+    for (const std::string& text : negative_masses(run, request)) verdict.warnings.push_back(text);
     verdict.failure = failure_of(run, request, result, observers, departure);
     return verdict;
 }

@@ -10,6 +10,7 @@
 
 #include "analysis/accuracy/companion/companion.hpp"
 #include "analysis/accuracy/formulas/domains.hpp"
+#include "analysis/accuracy/formulas/walls_together.hpp"
 #include "analysis/accuracy/step_judge.hpp"
 #include "analysis/accuracy/watch/energy_watch.hpp"
 #include "analysis/accuracy/watch/watch.hpp"
@@ -45,6 +46,7 @@ std::string ends_early(const PreparedRun& run, const TrajectoryResult& result);
 // All that looks at the states of a run, and what each of them has to keep for a later run that goes on.
 class RunObservers {
 public:
+    // What a checkpoint must have; one of an earlier version has no "walls together".
     static inline const std::vector<std::string> names = {"counts",       "watch",     "step judge",
                                                           "energy watch", "companion", "left domain"};
 
@@ -55,6 +57,7 @@ public:
           judge(run.scene),
           energy(run.outline, run.plain),
           domains(run.scene, run.outline.system),
+          walls(run.scene, stepper, request),
           parameters(request.parameters),
           counts(1 + run.scene.reported().size(), 0) {
         if (!measures) return;
@@ -74,6 +77,7 @@ public:
         counts[0] += static_cast<double>(records.count);
     }
     void observe(const EventRecords& records) {
+        walls.observe(records);
         for (std::int64_t i = 0; i < records.count; ++i)
             ++counts[1 + static_cast<std::size_t>(records.rows[i * records.columns])];
     }
@@ -84,7 +88,8 @@ public:
                 {"step judge", judge.save()},
                 {"energy watch", energy.save()},
                 {"companion", companion ? companion->save() : std::vector<double>()},
-                {"left domain", left_domain}};
+                {"left domain", left_domain},
+                {"walls together", walls.save()}};
     }
     void restore(const std::map<std::string, std::vector<double>>& saved) {
         counts = saved.at("counts");
@@ -96,6 +101,7 @@ public:
             began_unmeasured = true;
         }
         left_domain = saved.at("left domain");
+        if (const auto at = saved.find("walls together"); at != saved.end()) walls.restore(at->second);
     }
 
     Watch watch;
@@ -106,6 +112,7 @@ public:
     bool ended_by_caller = false;        // it was not waited for
     bool began_unmeasured = false;       // in an earlier part of the run, so that nothing can be compared
     Domains domains;
+    WallsTogether walls;
     std::vector<double> parameters;
     std::vector<double> left_domain;  // t, q, p: the first state where a formula has no value
     std::vector<double> counts;       // of the states, and of each kind of event

@@ -158,7 +158,10 @@ double jacobian_defect(const Derivation& derivation, const Kernel& kernel, const
         stepper.dense(number_of<real>(GiNaC::numeric(place)), position, velocity);
         for (const int k : solved_for) {
             const auto here = static_cast<std::size_t>(k);
-            const real moved = position[here] - q[here], way = moved == 0 ? step : moved;
+            // What hardly moves, as near an equilibrium, is moved by more than its rounding.
+            const auto size = [](real x) { return x < 0 ? -x : x; };
+            const real moved = position[here] - q[here], least = real(0x1p-20) * size(position[here]);
+            const real way = size(moved) > least ? moved : least > 0 ? least : step;
             X.push_back(position[here] + way * random());
             direction.push_back(way * random());
         }

@@ -11,7 +11,7 @@
 namespace lobatto {
 
 Scene ending_at_stop(Scene scene) {
-    if (scene.run.stops.empty()) return scene;
+    if (!scene.may_end_early()) return scene;
     Scene looking = scene;
     looking.method.numbers = Precision::double_;
     const Kernel kernel =

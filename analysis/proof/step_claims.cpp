@@ -150,8 +150,9 @@ void prove_symplecticity(std::vector<ProofRow>& rows, const Kernel& kernel, cons
                            not_symplectic);
         }));
     }
-    rows.push_back(decided("tangent map against differences", [&] {
-        return at_most("tangent map against differences", tangent_defect(exact_kernel, smooth, start.step), 1e-18,
+    rows.push_back(decided("tangent map against differences, beyond rounding", [&] {
+        return at_most("tangent map against differences, beyond rounding",
+                       tangent_defect(exact_kernel, smooth, start.step), 1e-18,
                        "the tangent map is not the derivative of the step");
     }));
     double conditioned = 1;

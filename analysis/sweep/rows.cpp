@@ -93,7 +93,7 @@ SweepRows::SweepRows(const Scene& scene, const SweepStarts& starts, std::int64_t
     }
     status_ = add_own("status", true);
     steps_ = add_own("steps", true);
-    if (!scene.run.stops.empty()) stop_ = add_own("stop", true);
+    if (scene.may_end_early()) stop_ = add_own("stop", true);
     time_ = add("t");
     for (const Reduction& kept : scene.outputs.kept) {
         const std::string name = name_of_column(kept.text);

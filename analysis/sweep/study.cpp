@@ -117,7 +117,7 @@ void SweepStudy::count_steps() {
     if (!options_.steps && *std::max_element(steps_.begin(), steps_.end()) == 0)
         steps_of_run(starts_->with_settings(scene_, 0), options_.overrides);
     constexpr double rounding = 1e-9;
-    if (!scene_.clock && !options_.steps && scene_.run.stops.empty() && last_end - first_end > rounding * last_end)
+    if (!scene_.clock && !options_.steps && !scene_.may_end_early() && last_end - first_end > rounding * last_end)
         warnings_.push_back(
             fmt::format("the end time is not a multiple of every step: trajectories end at the last multiple before "
                         "it, from t = {:.6g} to t = {:.6g}, and differ for that alone",
@@ -209,7 +209,7 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
     // With more than two coordinates one register of each value is enough for all threads (ensemble_lanes), so that no
     // number of them changes what a trajectory becomes. Impacts are of single trajectories.
     const std::int64_t count = starts_->count_of_setting();
-    const bool is_refilled = !scene_.outputs.kept.empty() || !scene_.run.stops.empty();
+    const bool is_refilled = !scene_.outputs.kept.empty() || scene_.may_end_early();
     const std::int64_t together =
         scene_.coordinates.size() > 2 ? std::min<std::int64_t>(count, 8) : count / thread_count(options_.threads);
     Compiled compiled;
@@ -241,7 +241,7 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
     request.every = looked_at(kept_by_sweeps(options_.overrides, scene), setting.steps.count, options_.measures,
                               scene.clock.has_value());
     request.threads = options_.threads;
-    request.stops = !scene.run.stops.empty();
+    request.stops = scene.may_end_early();
     if (!scene.outputs.kept.empty()) {  // threads copy it: formulas are not for several at once
         ClockedSteps clocked;
         if (scene.clock)

@@ -2,6 +2,7 @@
 // lobatto run: a scene from text to trajectory, and what there is to say about it.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -13,6 +14,7 @@
 #include "cli/options/output_path.hpp"
 #include "cli/options/overrides.hpp"
 #include "cli/options/resume.hpp"
+#include "cli/print/after_a_while.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/progress.hpp"
@@ -188,10 +190,12 @@ void print_table(const PreparedRun& run, const TrajectoryRequest& request, const
 void print_events(const Scene& scene, const TrajectoryResult& result, const std::vector<double>& counts,
                   const std::string& path) {
     const std::vector<Event> watched = scene.reported();
-    if (result.stop >= 0)
-        print_row("stopped", fmt::format("by '{}' at t = {:.9g}", watched[static_cast<std::size_t>(result.stop)].text,
-                                         result.time));
     const std::size_t stops = scene.outputs.events.size(), impacts = stops + scene.run.stops.size();
+    if (result.stop >= 0) {
+        const auto number = static_cast<std::size_t>(result.stop);
+        print_row("stopped", fmt::format("{} '{}' at t = {:.9g}", number < impacts ? "by" : "at rest on",
+                                         watched[number].text, result.time));
+    }
     bool is_named = false;
     for (std::size_t i = 0; i < watched.size(); ++i) {
         if (i == impacts) is_named = false;
@@ -313,6 +317,17 @@ void refuse_format(const RunOptions& options) {
                                      is_standard_output(options.output) ? "standard output" : options.output));
 }
 
+// What to say if deriving takes long. Empty: nothing.
+std::string on_long_formulas(const Scene& scene) {
+    const auto in_space =
+        std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const auto& b) { return !b.plane; });
+    const auto coordinates = std::ssize(scene.coordinates);  // 7 of a free body, which no joint makes long
+    return in_space > 2 && coordinates < 7 * in_space
+               ? "lobatto: formulas of bodies in space grow about threefold with each joint of a chain; constraint = "
+                 "true in the line of a joint keeps them short (docs/scene_format.md)"
+               : "";
+}
+
 void run(const RunOptions& options) {
     if (!options.output.empty()) keep_scene(options.scene, options.output);
     refuse_format(options);
@@ -322,7 +337,9 @@ void run(const RunOptions& options) {
     const api::Scene read(options.scene);
     Say say;
     if (!quiet) say("deriving and compiling");
+    std::optional<AfterAWhile> waiting(quiet ? "" : on_long_formulas(read.parts().scene));
     api::OpenedRun opened(read, wish_of(options), options.general);
+    waiting.reset();
     say.clear();
     const PreparedRun& run = opened.prepared();
     const TrajectoryRequest& request = opened.request();

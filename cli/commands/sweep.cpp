@@ -81,8 +81,8 @@ TableHead head_of(const SweepStudy& study) {
             parameters.push_back(fmt::format("{} = {}", scene.parameters[i].name, exact_text(start.parameters[i])));
     if (!parameters.empty()) head.add("parameters", fmt::format("{}", fmt::join(parameters, ", ")));
     for (const auto& [what, text] : starts.sources()) head.add(what, text);
-    for (std::size_t i = 0; i < scene.run.stops.size(); ++i)
-        head.add(fmt::format("stop {}", i + 1), scene.run.stops[i].text);
+    for (const auto& [number, event] : scene.ends())
+        head.add(fmt::format("stop {}", number - scene.outputs.events.size() + 1), event.text);
     for (int status = 0; status < LOBATTO_STATUSES; ++status)
         if (status != LOBATTO_UNSUPPORTED && status != LOBATTO_STOPPED)
             statuses.push_back(fmt::format("{} {}", status, sweep_statuses[static_cast<std::size_t>(status)]));

@@ -271,6 +271,10 @@ std::string text_of(const StabilityReport& report) {
                 fmt::format("\nAbout the equilibrium {}, h = {:.6g}:\n", position_text(report, point.q), report.step);
         text += point_text(report, point);
     }
+    if (!linear && !report.points.empty())
+        text +=
+            "\nEquilibria are sought from the start and from places along the motion; there may be others. Another "
+            "start,\nby position = ... in the scene, finds those near it.\n";
     if (report.trajectory) text += trajectory_text(report);
     if (report.energy) text += energy_text(report);
     return text;

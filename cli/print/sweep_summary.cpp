@@ -112,7 +112,7 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
     if (all.error.index >= 0)
         print_row("measured error", fmt::format("{:.1e} of the amplitude at most, of trajectory {}, {}",
                                                 all.error.value, all.error.index, starts.text_of(all.error.index)));
-    if (study.measures() && all.unmeasured > 0 && !scene.run.stops.empty())
+    if (study.measures() && all.unmeasured > 0 && scene.may_end_early())
         print_row(
             all.error.index >= 0 ? "  not of" : "measured error",
             fmt::format("{}{} could not be followed to the stop in other steps",

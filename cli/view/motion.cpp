@@ -220,6 +220,21 @@ std::vector<std::vector<double>> frames_of(const ShownStates& states, const Load
     return frames;
 }
 
+// Of a motion that fails, how many frames to show: else it is a dot in a picture as wide as where it was thrown.
+std::size_t frames_before_blow_up(const std::vector<std::vector<double>>& frames, const TrajectoryRequest& request) {
+    std::vector<double> farthest;
+    const auto first = static_cast<std::ptrdiff_t>(request.parameters.size()) + 1;
+    for (const std::vector<double>& frame : frames) {
+        farthest.push_back(0);
+        for (auto q = frame.begin() + first; q != frame.begin() + first + std::ssize(request.q); ++q)
+            farthest.back() = std::fmax(farthest.back(), std::fabs(*q));
+    }
+    const double sane = *std::max_element(farthest.begin(), farthest.begin() + (std::ssize(farthest) + 3) / 4);
+    const auto beyond = [&](double far) { return !(far <= 1e5 * sane); };
+    const auto count = std::find_if(farthest.begin(), farthest.end(), beyond) - farthest.begin();
+    return sane > 0 && std::isfinite(sane) && count >= 2 ? static_cast<std::size_t>(count) : frames.size();
+}
+
 // Whether so few states are shown that what is seen is another motion: between two of them the mean velocity does not
 // lead from one position to the next, or an angle goes most of half a turn. `frames`: parameters, t, q, velocities, ...
 bool is_too_fast(const Scene& scene, const std::vector<std::vector<double>>& frames) {
@@ -270,7 +285,6 @@ Viewed viewed_motion(const api::Scene& written, const api::Settings& settings, b
     values.set = settings.set;
     values.step = settings.step;
     values.until = settings.until;
-    values.measure = false;
     api::OpenedRun run(api::scene_of(kept), values);
     add_energy(viewed, scene, channels,
                run.prepared().outline.conserves_energy() ? std::optional<GiNaC::ex>(energy_change) : std::nullopt);
@@ -305,8 +319,14 @@ Viewed viewed_motion(const api::Scene& written, const api::Settings& settings, b
     motion.note = fmt::format("{}h = {:.4g}{}{}", motion.label == method ? "" : method + ", ", request.step,
                               scene.clock ? " in the time of a clock" : "",
                               states.every() > 1 ? fmt::format(", one state in {}", states.every()) : "");
-    for (std::size_t i = 0; i < states.count(); ++i) motion.times.push_back(states.row(i)[0]);
-    const std::vector<std::vector<double>> frames = frames_of(states, stepper, request);
+    std::vector<std::vector<double>> frames = frames_of(states, stepper, request);
+    if (!viewed.failure.empty()) frames.resize(frames_before_blow_up(frames, request));
+    if (frames.size() < states.count()) {
+        const double end = states.row(frames.size() - 1)[0];
+        std::erase_if(motion.events, [&](const ViewEvent& event) { return event.time > end; });
+        viewed.failure += fmt::format(" The page ends at t = {:.6g}, before the motion blows up.", end);
+    }
+    for (std::size_t i = 0; i < frames.size(); ++i) motion.times.push_back(states.row(i)[0]);
     motion.channels = channels.values(frames);
     if (viewed.failure.empty() && states.every() > 1 && is_too_fast(scene, frames))
         viewed.failure = fmt::format(

@@ -389,11 +389,12 @@ private:
 
     void impacts() {
         const std::vector<Impact>& walls = derivation_.scene.impacts;
-        std::vector<ex> gradient, rate, restitution, position, velocity;
+        std::vector<ex> gradient, rate, restitution, rest, position, velocity;
         for (const Impact& wall : walls) {
             for (const GiNaC::symbol& q : system_.q) gradient.push_back(wall.when.value.diff(q));
             rate.push_back(wall.when.value.diff(system_.t));
             restitution.push_back(wall.restitution);
+            rest.push_back(wall.rest);
             position.insert(position.end(), wall.reset_position.begin(), wall.reset_position.end());
             velocity.insert(velocity.end(), wall.reset_velocity.begin(), wall.reset_velocity.end());
         }
@@ -402,6 +403,7 @@ private:
         compare(claim, formulas_(gradient), machine_.get("G", gradient.size()));
         compare(claim, formulas_(rate), machine_.get("g_t", rate.size()));
         compare(claim, formulas_(restitution), machine_.get("restitution", restitution.size()));
+        compare(claim, formulas_(rest), machine_.get("rest", rest.size()));
         if (position.empty()) return;
         machine_.run("reset");
         compare(claim, formulas_(position), machine_.get("q1", position.size()));

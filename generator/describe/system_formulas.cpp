@@ -73,7 +73,7 @@ void Describer::quadrature() {
     vector("weights", "D22", "eq:lobattoQuad", "weights", numbered("b", r), q.weights);
     if (!lobatto_)
         vector("control_points", "D28", "", "control points: their positions determine the path in a step",
-               numbered("x", controls_), q.control);
+               numbered("d", controls_), q.control);
     vector("basis", "D22", "eq:basisFunctions",
            std::string("basis: the polynomials that are 1 at their ") + (lobatto_ ? "node" : "control point") +
                ", 0 at the others",
@@ -155,10 +155,11 @@ void Describer::general_system() {
     vector("momentum", "D25", "", "momentum, dL/dq'", by_coordinate("p"), system.momentum);
     const bool forced = system.has_forces();
     vector("force", "D25", "", forced ? "force, dL/dq + F" : "force, dL/dq", by_coordinate("f"), system.force);
-    second_derivatives("momentum_by_velocity", "dp/dq'", "p_v", system.momentum_v);
-    second_derivatives("momentum_by_position", "dp/dq", "p_q", system.momentum_q);
-    second_derivatives("force_by_velocity", "df/dq'", "f_v", system.force_v);
-    second_derivatives("force_by_position", "df/dq", "f_q", system.force_q);
+    second_derivatives("momentum_by_velocity", "derivatives of the momenta by the velocities v", "dp/dv",
+                       system.momentum_v);
+    second_derivatives("momentum_by_position", "and by the positions", "dp/dq", system.momentum_q);
+    second_derivatives("force_by_velocity", "derivatives of the forces by the velocities v", "df/dv", system.force_v);
+    second_derivatives("force_by_position", "and by the positions", "df/dq", system.force_q);
     GiNaC::ex energy = -system.lagrangian;
     for (std::size_t k = 0; k < n_; ++k) energy += system.momentum[k] * system.v[k];
     scalar("energy", "D26", "", "energy, p.q' - L", "H", energy);

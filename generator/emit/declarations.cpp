@@ -16,9 +16,10 @@ const Declaration of_events = {"event", "What is watched, at a state: the scene'
                                "void",  {{in, "q"}, {in, "velocity"}, {out, "value"}},
                                true,    true};
 const Declaration of_impacts = {"impact",
-                                "(D52) Of each wall g(q, t) = 0: dg/dq, dg/dt at fixed q, and its restitution.",
+                                "(D52) Of each wall g(q, t) = 0: dg/dq, dg/dt at fixed q, its restitution, and the "
+                                "speed below which the motion comes to rest there.",
                                 "void",
-                                {{in, "q"}, {out, "G"}, {out, "g_t"}, {out, "restitution"}},
+                                {{in, "q"}, {out, "G"}, {out, "g_t"}, {out, "restitution"}, {out, "rest"}},
                                 true};
 const Declaration of_resets = {"reset",
                                "The state after each impact that the scene gives one.",

@@ -181,6 +181,9 @@ void Parser::refuse_by_role(const Syntax& formula, std::string_view base) const 
     const auto is_declared = [&](const std::string& written) {
         return std::find(declared.begin(), declared.end(), written) != declared.end();
     };
+    if (scope_.motion_allowed && advice.empty() && name.ends_with("'") && name.size() > 3)
+        if (advice = suggestion(name.substr(0, name.size() - 1), near); !advice.empty())
+            advice.replace(advice.rfind("'?"), 2, "''?");  // the velocity of that
     if (scope_.motion_allowed && advice.empty() && name.ends_with("'"))
         advice = fmt::format(
             " A coordinate {0} needs a line {0} = {{ position = ..., velocity = ... }} under "

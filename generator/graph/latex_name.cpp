@@ -22,6 +22,8 @@ std::string latex_name(const std::string& name) {
         return names;
     }();
     if (!name.empty() && name.front() == '\\') return name;
+    if (const auto by = name.find("/d"); name.starts_with("d") && by != std::string::npos)  // dp/dq
+        return "\\partial " + latex_name(name.substr(1, by - 1)) + "/\\partial " + latex_name(name.substr(by + 2));
     std::string stem = name, subscript;
     const bool velocity = !stem.empty() && stem.back() == '\'';
     if (velocity) stem.pop_back();

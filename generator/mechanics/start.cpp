@@ -148,12 +148,13 @@ private:
     }
 
     void name_culprit() {
-        const auto require = [&](const ex& formula, const auto& what, Position place) {
+        const auto require = [&](const ex& formula, const auto& what, Position place, const char* remedy = "") {
             try {
                 start_({formula});
             } catch (const DomainError& error) {
-                scene_.source.fail(place, fmt::format("{} at the start, {}: {}; start elsewhere, or mend the formula",
-                                                      what(), values_in(formula, system_, start_), error.what()));
+                scene_.source.fail(
+                    place, fmt::format("{} at the start, {}: {}; start elsewhere, or mend the formula{}", what(),
+                                       values_in(formula, system_, start_), error.what(), remedy));
             }
         };
         const Position lagrangian = scene_.lagrangian_at;
@@ -179,7 +180,8 @@ private:
             for (const auto* symbols : {&system_.q, &system_.v})
                 for (const auto& symbol : *symbols)
                     require(
-                        force.diff(symbol), [&] { return on + " has no derivative in " + symbol.get_name(); }, place);
+                        force.diff(symbol), [&] { return on + " has no derivative in " + symbol.get_name(); }, place,
+                        ": for sqrt(u) write sqrt(u + 1e-20)");
         }
         for (const Constraint& constraint : system_.constraints) {
             require(

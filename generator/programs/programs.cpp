@@ -78,6 +78,7 @@ void ProgramBuilder::impacts() {
             impact.outputs.push_back({at("G", w * n_ + k), convert(walls[w].diff(d_.system.q[k]))});
         impact.outputs.push_back({at("g_t", w), convert(walls[w].diff(d_.system.t))});
         impact.outputs.push_back({at("restitution", w), convert(wall.restitution)});
+        impact.outputs.push_back({at("rest", w), convert(wall.rest)});
         if (wall.reset_position.empty()) continue;
         for (std::size_t k = 0; k < n_; ++k) {
             reset.outputs.push_back({at("q1", resets * n_ + k), convert(wall.reset_position[k])});

@@ -66,11 +66,12 @@ void SystemReader::read_impact(const Entry& entry) {
     const Table table(source_, table_of(source_, entry, "{ when = \"y = 0 falling\", restitution = 1 }"), entry.at,
                       "impact " + name, keys_of_section("impacts"));
     const Entry& when = table.get("when", "for example when = \"y = 0 falling\"");
-    const Entry *restitution = table.find("restitution"), *reset = table.find("reset");
+    const Entry *restitution = table.find("restitution"), *rest = table.find("rest"), *reset = table.find("reset");
     if (when.value.kind != Value::Kind::text)
         fail(when.value.at,
              fmt::format("when must be a text such as \"y = 0 falling\", not {}", when.value.kind_name()));
     if (restitution != nullptr && reset != nullptr) fail(reset->at, "an impact has a restitution or a reset; keep one");
+    if (rest != nullptr && reset != nullptr) fail(rest->at, "a reset leaves the wall as it says; leave out rest");
     const long count = count_of(entry, table.find("count"), array, "impact");
     Scope scope = scope_of("the impact " + name, true);
     if (index) scope.indices = {*index};
@@ -113,6 +114,13 @@ void SystemReader::read_impact(const Entry& entry) {
             for (const GiNaC::ex& margin : {impact.restitution, 1 - impact.restitution})
                 require(margin, true, fmt::format("the restitution of {} is not within 0 to 1", impact.written),
                         restitution->value.at);
+        }
+        if (rest != nullptr) {
+            GiNaC::numeric speed = 0;
+            const std::string complaint = fmt::format("rest of {} is negative; it is a speed", impact.written);
+            impact.rest = read_formula(*rest, scope_of("rest", false), &speed);
+            if (speed.is_negative()) fail(rest->value.at, complaint);
+            require(impact.rest, true, complaint, rest->value.at);
         }
         if (reset != nullptr) read_reset(*reset, impact, scope, indices);
         scene_.impacts.push_back(impact);
@@ -164,6 +172,7 @@ GiNaC::exset SystemReader::symbols_of_kernel() const {
     if (scene_.clock) add(scene_.clock->rate);
     for (const Impact& impact : scene_.impacts) {
         add(impact.restitution);
+        add(impact.rest);
         for (const auto* formulas : {&impact.reset_position, &impact.reset_velocity})
             for (const GiNaC::ex& formula : *formulas) add(formula);
     }

@@ -196,7 +196,7 @@ void SystemReader::read_constraint(const Entry& entry) {
         constraint.at = equation->value.at;
         if (value.velocities)
             fail(constraint.at, fmt::format("the constraint {} holds a velocity; a constraint is an equation of "
-                                            "positions and the time (holonomic)",
+                                            "positions and the time (holonomic): x = r*th, not x' = r*th'",
                                             constraint.written));
         const GiNaC::exset held = symbols_of(constraint.value);
         if (std::none_of(scene_.coordinates.begin(), scene_.coordinates.end(),

@@ -327,6 +327,17 @@ std::vector<Event> Scene::reported() const {
     return all;
 }
 
+std::vector<std::pair<std::size_t, Event>> Scene::ends() const {
+    std::vector<std::pair<std::size_t, Event>> all;
+    std::size_t number = outputs.events.size();
+    for (const Event& stop : run.stops) all.emplace_back(number++, stop);
+    for (const Impact& impact : impacts) {
+        if (!impact.rest.is_zero()) all.emplace_back(number, impact.when);
+        ++number;
+    }
+    return all;
+}
+
 std::vector<Event> Scene::watched() const {
     std::vector<Event> all = reported();
     for (const Switch& one : switches) all.push_back({one.text, one.value, 0, one.at});

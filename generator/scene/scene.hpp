@@ -144,6 +144,7 @@ struct Impact {
     std::string written = name;  // in the scene: touch[3]
     Event when = {};             // with a direction, free of velocities
     GiNaC::ex restitution = 1;   // in parameters
+    GiNaC::ex rest = 0;          // in parameters: the run ends where the motion leaves the wall more slowly; 0: never
     // n each, of the state after it in that before it; empty: the momentum jumps instead.
     std::vector<GiNaC::ex> reset_position = {}, reset_velocity = {};
 };
@@ -223,7 +224,10 @@ struct Scene {
 
     // All that a kernel looks for in each step: events, then stops, impacts, switches.
     std::vector<Event> watched() const;
-    std::vector<Event> reported() const;                                   // without switches, which are no events
+    std::vector<Event> reported() const;  // without switches, which are no events
+    // Of these, with their numbers, those that may end the run: stops, and walls with `rest`.
+    std::vector<std::pair<std::size_t, Event>> ends() const;
+    bool may_end_early() const { return !ends().empty(); }
     bool is_cut() const { return !impacts.empty() || !switches.empty(); }  // whether steps may be
 
     // A formula with the sides of switches where the motion is, not where it starts: for evaluation, not derivation.

@@ -64,6 +64,11 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
         if table is not None and not hasattr(table, "items"):
             raise InputError(f"{name} is a table, such as {name}=dict({examples[name]}), "
                              f"not {table!r}")
+    for name, value in variables.items():
+        is_table = isinstance(value, (dict, list)) and not ({"value", "position"} & set(value))
+        if is_table and name in ("constraints", "impacts", "bodies", "joints", "events", "stop", "view", "run"):
+            raise InputError(f"{name} has no argument of its own; write it as text, as in a scene file: "
+                             f'extra="[constraints]\\nrod = \\"x^2 + y^2 = 1\\""')
     formulas = [lagrangian, *(str(formula) for formula in (definitions or {}).values())]
     for name in variables:
         if not name.isascii():
@@ -103,7 +108,10 @@ def Lagrangian(lagrangian, *, title="", time="", step=0.01, until=10, method=Non
         raise InputError(f"inputs is a list of names: inputs=[{inputs!r}]")
     inputs = list(inputs)
     for name in inputs:
-        if name in moving or name not in variables:
+        if name in moving:
+            raise InputError(f"'{name}' is a coordinate, which stands in the Lagrangian with a prime; inputs are "
+                             f"parameters")
+        if name not in variables:
             raise InputError(f"'{name}' is to be an input; give its value: Lagrangian(..., {name}=0, "
                              f"inputs=[{name!r}])")
     lines.append("[parameters]")

@@ -33,11 +33,11 @@ def _table(rows):
 
 
 class _Rows:
-    """Columns by name: x, p_x; of an array x[3], which is also x_3, or all of it, x."""
+    """Columns by name: x, p_x; of an array x[3], which is also x_3, or all of it, x; arm.angle, which is arm_angle."""
 
     def _index(self, name):
         names = [variable.name for variable in self.coordinates]
-        rows, name = self.q, re.sub(r"\[(\d+)\]$", r"_\1", name)
+        rows, name = self.q, re.sub(r"\[(\d+)\]$", r"_\1", name).replace(".", "_")
         if name not in names and name.startswith("p_"):
             rows, name = self.p, name[2:]
         if name in names:
@@ -92,6 +92,7 @@ class Trajectory(_Rows):
         return {**self.__dict__, "_stepper": None}
 
     def _index(self, name):
+        name = name.replace(".", "_")
         if name in self.column_names:
             return self.columns, self.column_names.index(name)
         return super()._index(name)

@@ -152,7 +152,7 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
     times, q, p, velocities, status, message = [0.0], [stepper.q.copy()], [stepper.p.copy()], [stepper.velocity], 0, ""
     try:
         while stepper.t < end:
-            going = stepper.step() if stepper._next_time < end * (1 - 1e-12) else stepper.advance_to(end)
+            going = stepper.step() if stepper.next_time < end * (1 - 1e-12) else stepper.advance_to(end)
             times.append(stepper.t)
             q.append(stepper.q.copy())
             p.append(stepper.p.copy())

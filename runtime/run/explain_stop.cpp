@@ -34,6 +34,17 @@ Reason off_constraints(bool on_the_way) {
             "positions and velocities that keep them, or assemble = true under [run] of a scene with constraints"};
 }
 
+Reason accumulating(const std::string& smaller) {
+    return {
+        "impacts accumulate within this step, or passages of a switch: more than 100 of them, or nearer to one "
+        "another than can be told apart. The motion comes to rest on a wall, slides along it or is held fast "
+        "by friction, which is not computed; the wall's formula jumps; a reset leaves the motion on its way "
+        "through the wall; or the step is too long for a switch",
+        "rest = 0.01 in the line of the wall, which ends the run at an impact as slow as this, an earlier "
+        "end, tanh(v/w) in place of sign(v) in a friction, or " +
+            smaller + " where many impacts belong into a step"};
+}
+
 // `smaller`: the advice of a smaller step; `more`: what else to try.
 Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& request, const std::string& smaller,
                  const std::string& more) {
@@ -71,8 +82,8 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
         case LOBATTO_SINGULAR_JACOBIAN:
             why =
                 "the equations for the positions inside the step have no unique solution: their Jacobian is singular. "
-                "This h meets a resonance of the forces there, or constraints depend on one another, as at a dead "
-                "point";
+                "This h meets a resonance of the forces there, a body turns by a large part of a revolution in it, or "
+                "constraints depend on one another, as at a dead point";
             advice = smaller + ", or a slightly different one";
             break;
         case LOBATTO_SINGULAR_MASS:
@@ -92,13 +103,7 @@ Reason reason_of(const TrajectoryResult& result, const TrajectoryRequest& reques
         case LOBATTO_OFF_CONSTRAINTS:
             return off_constraints(result.started);
         case LOBATTO_IMPACTS_ACCUMULATE:
-            why =
-                "impacts accumulate within this step: more than 100 of them, or nearer to one another than can be told "
-                "apart. The motion comes to rest on a wall, slides along it, is held fast by friction (where tanh(v/w) "
-                "goes on, not sign(v)), or a reset leaves it on its way through the wall; none of these is computed";
-            advice = "an end before that time, a stop under [run] where the motion has become slow, or " + smaller +
-                     " where many impacts belong into a step";
-            break;
+            return accumulating(smaller);
         case LOBATTO_TIME_STANDS_STILL:
             if (request.arrivals.interval != 0) {
                 why =

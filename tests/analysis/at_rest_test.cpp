@@ -279,3 +279,36 @@ TEST_CASE("an equilibrium is no motion that is lost, wherever it is") {
     CHECK(test::contains(thrown.err, "a smaller step, such as h = 0.175"));
     CHECK(stable.run({"--step", "0.1"}).exit_code == 0);
 }
+
+TEST_CASE("a motion that rests because each step changes less than a last digit is not called right") {
+    // Momenta that are not 0 at rest, of a frame that turns, take no smaller change.
+    const std::string saddle =
+        "lagrangian = \"((x' - W*y)^2 + (y' + W*x)^2)/2 - W^2*(x^2 + y^2)/2 - ((x - 1)^2 - (y - "
+        "1)^2)/2\"\n[parameters]\n"
+        "W = 1\n[coordinates]\nx = { position = 1, velocity = 0 }\ny = { position = \"1 + 1e-14\", velocity = 0 }\n";
+    const std::string second_point =
+        "lagrangian = \"((x' - y)^2 + (y' + x)^2)/2 + (1 - mu)/sqrt((x + mu)^2 + y^2) + mu/sqrt((x - 1 + mu)^2 + "
+        "y^2)\"\n"
+        "[parameters]\nmu = 0.01215\n[coordinates]\nx = { position = 1.1556799130947353, velocity = 0 }\n"
+        "y = { position = 0, velocity = 0 }\n";
+    for (const std::string& lagrangian : {saddle + "[run]\nstep = 0.01\nuntil = 100\n",
+                                          second_point + "[run]\nstep = 0.001\nuntil = 30\n[output]\nevery = 1000\n"}) {
+        const test::MeasuredScene held(lagrangian);
+        const test::Finished done = held.run();
+        CHECK(done.exit_code == 3);
+        CHECK(test::contains(done.err, "or each step changes less than a last digit"));
+    }
+    // A stable one, in the same frame.
+    const test::MeasuredScene stable(
+        "lagrangian = \"((x' - y)^2 + (y' + x)^2)/2 + (1 - mu)/sqrt((x + mu)^2 + y^2) + mu/sqrt((x - 1 + mu)^2 + "
+        "y^2)\"\n"
+        "[parameters]\nmu = 0.01215\n[coordinates]\nx = { position = \"0.5 - mu\", velocity = 0 }\n"
+        "y = { position = \"sqrt(3)/2\", velocity = 0 }\n[run]\nstep = 0.001\nuntil = 100\n[output]\nevery = 1000\n");
+    CHECK(stable.run().exit_code == 0);
+    // The same in a sweep.
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "saddle.toml", saddle + "[run]\nstep = 0.01\nuntil = 100\n");
+    const test::Finished swept =
+        test::run({LOBATTO_PROGRAM, "sweep", folder / "saddle.toml", "--vary", "W=1,1.0", "-o", folder / "swept.csv"});
+    CHECK(test::contains(swept.out + swept.err, "not resolved"));
+}

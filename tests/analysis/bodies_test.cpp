@@ -183,3 +183,28 @@ TEST_CASE("a distance is a rod, and two hinges and one more close a loop") {
     CHECK(std::fabs(loop[0] - one[0]) < 1e-12);
     CHECK(std::fabs(loop[1] + one[0]) < 1e-12);
 }
+
+TEST_CASE("a joint that is a constraint moves its bodies as one that they hang on") {
+    const std::string bodies =
+        "lagrangian = \"-2*top.z - arm.z\"\n[bodies]\n"
+        "top = { mass = 2, inertia = [0.3, 0.4, 0.2], position = [0, 0, 1], velocity = [0.3, 0, 1], angular_velocity = "
+        "[0.5, 0.2, 1] }\n"
+        "arm = { mass = 1, inertia = [0.1, 0.1, 0.02], position = [0.5, 0, 1]";
+    const std::string joint =
+        "[joints]\nshoulder = { type = \"ball\", bodies = [\"top\", \"arm\"], point = [0.2, 0, 1]";
+    // Of its point (0.2, 0, 0): v + omega x r = (0.3, 0.2, 1 - 0.04). The arm does not turn.
+    const std::vector<double> hung = end_of(bodies + " }\n" + joint + " }\n"),
+                              held = end_of(bodies + ", velocity = [0.3, 0.2, 0.96] }\n" + joint +
+                                            ", constraint = true }\n");
+    REQUIRE(hung.size() == 3 + 4 + 4);
+    REQUIRE(held.size() == 3 + 4 + 3 + 4);
+    for (int k = 0; k < 3; ++k) CHECK(std::fabs(hung[std::size_t(k)] - held[std::size_t(k)]) < 1e-9);
+    for (int j = 0; j < 3; ++j)
+        for (int i = 0; i < 3; ++i) {
+            const auto at = [&](const std::vector<double>& q, std::ptrdiff_t first) {
+                return column({q.begin() + first, q.begin() + first + 4}, j)[std::size_t(i)];
+            };
+            CHECK(std::fabs(at(hung, 3) - at(held, 3)) < 1e-9);
+            CHECK(std::fabs(at(hung, 7) - at(held, 10)) < 1e-9);
+        }
+}

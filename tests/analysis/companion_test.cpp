@@ -173,6 +173,12 @@ TEST_CASE("two motions that diverged and meet again by chance are not taken for 
     INFO(warned.out << warned.err);
     const bool is_lost = warned.exit_code == 3, is_warned = warned.err.find("of the amplitude") != std::string::npos;
     CHECK((is_lost || is_warned));
+    // What is largest is not called the error at the end.
+    const MeasuredScene drifting(
+        "lagrangian = \"x'^2/2 + y'^2 - x^4/4 - x^2*y^2 - y^2/2\"\n[coordinates]\nx = { position = 0.8, "
+        "velocity = 0.3 }\ny = { position = -0.2, velocity = 0.5 }\n[method]\npoints = 2\n[run]\n"
+        "step = 0.1\nuntil = 400\n");
+    CHECK(drifting.run().out.find("6.7e-01 of the amplitude at most (6.0e-01 in x)") != std::string::npos);
 }
 
 TEST_CASE("regular motions whose errors jump, and motions at rest, are neither exponential nor lost") {

@@ -549,3 +549,109 @@ TEST_CASE("formulas with sides may start at numbers that are not rational") {
             derive(scene_of("lagrangian = \"q'^2/2\"\n[coordinates]\nq = { position = \"" + position +
                             "\", velocity = 0 }\n[forces]\nq = \"-abs(q)\"\n[run]\nstep = 0.1\nuntil = 1\n")));
 }
+
+TEST_CASE("walls that are met at one time are told, unless they stand at right angles or nothing joins them") {
+    const auto said = [](const std::string& text) {
+        const test::TemporaryFolder folder;
+        test::write_text(folder / "walls.toml", text);
+        const test::Finished done =
+            test::run({LOBATTO_PROGRAM, "run", folder / "walls.toml", "-o", folder / "walls.csv"});
+        CHECK_MESSAGE(done.exit_code == 0, done.err);
+        return done.err;
+    };
+    const std::string together = "one time. They act one after another, in the order of the scene";
+    const std::string box =
+        "lagrangian = \"-9.81*box.y\"\n[bodies]\nbox = { mass = 1, inertia = \"2*w^2/3\", position = [0, 1], angle = "
+        "{} "
+        "}\n[parameters]\nw = 0.25\n[impacts]\nleft = { when = \"box.y(-w, -w) = 0 falling\", restitution = 0.5 }\n"
+        "right = { when = \"box.y(w, -w) = 0 falling\", restitution = 0.5 }\n" +
+        method("points = 4", 0.01, 0.45);
+    const auto tilted = [&](const std::string& angle) {
+        std::string text = box;
+        return text.replace(text.find("{}"), 2, angle);
+    };
+    CHECK(said(tilted("0")).find("the motion meets the walls left and right at " + together) != std::string::npos);
+    CHECK(said(tilted("0.1")).empty());
+    const auto point = [&](const std::string& walls) {
+        return "lagrangian = \"(x'^2 + y'^2)/2\"\n[coordinates]\nx = { position = 1, velocity = -1 }\ny = { position = "
+               "1, "
+               "velocity = -1 }\n[impacts]\n" +
+               walls + method("points = 3", 0.1, 1.5);
+    };
+    CHECK(said(point("a = { when = \"x = 0 falling\" }\nb = { when = \"y = 0 falling\" }\n")).empty());
+    CHECK(said(point("a = { when = \"x = 0 falling\" }\nb = { when = \"x + 2*y = 0 falling\" }\n")).find(together) !=
+          std::string::npos);
+    // One wall written twice; a wall with a reset that is not met.
+    CHECK(
+        said(point("a = { when = \"x = 0 falling\", restitution = 0.5 }\nb = { when = \"2*x = 0 falling\", restitution "
+                   "= 0.5 }\n"))
+            .empty());
+    CHECK(said(point("a = { when = \"x = 0 falling\" }\nb = { when = \"x + 2*y = 0 falling\" }\n"
+                     "c = { when = \"x = 9 rising\", reset = { \"x'\" = \"-2*x'\" } }\n"))
+              .find(together) != std::string::npos);
+    // Balls that touch: what one gets is thrown on to the next. Hit from both sides, the middle one is undecided, but
+    // for equal masses that lose nothing: they go on as if they had passed through one another.
+    const auto cradle = [&](const std::string& last) {
+        return "lagrangian = \"(x1'^2 + x2'^2 + x3'^2)/2\"\n[coordinates]\nx1 = { position = -1, velocity = 1 }\n"
+               "x2 = { position = 0, velocity = 0 }\nx3 = { " +
+               last +
+               " }\n[impacts]\na = { when = \"x2 - x1 = 0 falling\" }\nb = { when = \"x3 - x2 = 0 falling\" }\n" +
+               method("points = 3", 0.1, 1.5);
+    };
+    CHECK(said(cradle("position = 0, velocity = 0")).empty());
+    CHECK(said(cradle("position = 1, velocity = -1")).empty());
+    std::string heavy = cradle("position = 1, velocity = -1");
+    CHECK(said(heavy.replace(heavy.find("x3'^2"), 5, "2*x3'^2")).find(together) != std::string::npos);
+}
+
+TEST_CASE("a motion comes to rest on a wall where it leaves it more slowly than is asked for") {
+    // It flies e^k times 2 after impact k, and a height of 1 takes it a time of 1 to fall.
+    const auto resting = [](double e, const std::string& rest) {
+        std::string text = fmt::format(fmt::runtime(ball), e);
+        return text.replace(text.find("restitution = \"e\""), 17, "restitution = \"e\", rest = " + rest);
+    };
+    const Ended ended = run(resting(0.5, "0.1") + method("points = 4", 0.3, 10));
+    CHECK(ended.result.status == LOBATTO_OK);
+    REQUIRE(ended.events.size() == 5);  // it leaves with 1, 1/2, 1/4, 1/8, 1/16
+    CHECK(ended.result.stop == 0);
+    CHECK(std::fabs(ended.result.time - (1 + 1 + 0.5 + 0.25 + 0.125)) < 1e-14);
+    CHECK(std::fabs(ended.events.back()[3] - 3.0 / 16) < 1e-14);
+    // In sight of a stop the stop counts; with no restitution the first impact is the last; a start may lie there.
+    CHECK(run(resting(0.5, "0.1") + method("points = 4", 0.3, 10) + "stop = \"y' = 0.7\"\n").result.stop == 0);
+    const Ended first = run(resting(0, "1e-6") + method("points = 4", 0.3, 10));
+    CHECK(first.events.size() == 1);
+    CHECK(std::fabs(first.result.time - 1) < 1e-14);
+    std::string lying = resting(0.5, "0.1") + method("points = 4", 0.3, 10);
+    lying.replace(lying.find("position = 1"), 12, "position = 0");
+    CHECK(run(lying).result.time == 0);
+    // Its error is measured to there, and a sweep keeps it as a stop.
+    const test::TemporaryFolder folder;
+    for (const double e : {0.0, 0.5}) {
+        test::write_text(folder / "ball.toml", resting(e, "1e-3") + method("points = 4", 0.07, 10));
+        const test::Finished done =
+            test::run({LOBATTO_PROGRAM, "run", folder / "ball.toml", "-o", folder / "ball.csv"});
+        CHECK_MESSAGE(done.exit_code == 0, done.err);
+        CHECK(done.out.find("at rest on 'floor: y = 0 falling' at t = ") != std::string::npos);
+        CHECK(done.out.find("e-1") < done.out.find("of the amplitude"));
+    }
+    const test::Finished swept = test::run(
+        {LOBATTO_PROGRAM, "sweep", folder / "ball.toml", "--vary", "y=0.5:1.5:3", "-o", folder / "balls.csv"});
+    CHECK_MESSAGE(swept.exit_code == 0, swept.err);
+    CHECK(test::read_file(folder / "balls.csv").find("# stop 1: floor: y = 0 falling\n") != std::string::npos);
+    // Of walls that are met together the last one counts: here it goes on to the second, and both are left for good.
+    const Ended box =
+        run("lagrangian = \"-9.81*box.y\"\n[bodies]\nbox = { mass = 1, inertia = 0.04, position = [0, 1] }\n[impacts]\n"
+            "left = { when = \"box.y(-0.25, -0.25) = 0 falling\", restitution = 0, rest = 0.01 }\n"
+            "right = { when = \"box.y(0.25, -0.25) = 0 falling\", restitution = 0, rest = 0.01 }\n" +
+            method("points = 4", 0.01, 1));
+    REQUIRE(box.events.size() > 2);
+    CHECK(box.result.stop >= 0);
+    CHECK(std::fabs(box.result.time - std::sqrt(2 * 0.75 / 9.81)) < 1e-13);
+    for (std::size_t k = 0; k < 3; ++k) CHECK(std::fabs(box.result.p[k]) < 1e-2);  // both corners are slower than that
+    // Mistakes.
+    CHECK(refusal(resting(0.5, "-1") + method("points = 4", 0.3, 10)).find("rest of floor is negative") !=
+          std::string::npos);
+    std::string reset = resting(0.5, "1") + method("points = 4", 0.3, 10);
+    reset.replace(reset.find("restitution = \"e\""), 17, "reset = { \"y'\" = \"-y'\" }");
+    CHECK(refusal(reset).find("a reset leaves the wall as it says; leave out rest") != std::string::npos);
+}

@@ -123,3 +123,31 @@ TEST_CASE("a force that vanishes on the node of a wave is not called one that ha
     CHECK(wave.exit_code == 0);
     CHECK(wave.err == "");
 }
+
+TEST_CASE("a step too long for a stiff floor is not called a jump") {
+    const std::string floor =
+        "lagrangian = \"y'^2/2 - 9.81*y - 5e6*max(-y, 0)^2\"\n[coordinates]\ny = { position = 1, velocity = 0 "
+        "}\n[run]\n"
+        "step = 0.01\nuntil = 5\n";
+    const test::Finished done = run(floor);
+    CHECK(done.exit_code == 3);
+    CHECK(done.err.find("The step is too long for the forces met there, or the Lagrangian jumps") != std::string::npos);
+}
+
+TEST_CASE("a kinetic energy that is not positive is told") {
+    const auto of_mass = [](const std::string& mass) {
+        return "lagrangian = \"y'^2/2 + m*x'^2/2 - x^2/2 - y^2/2\"\n[parameters]\nm = " + mass +
+               "\n[coordinates]\nx = { position = 1, velocity = 0 }\ny = { position = 1, velocity = 0.5 }\n[run]\nstep "
+               "= "
+               "0.1\nuntil = 1\n";
+    };
+    CHECK(run(of_mass("-1")).err.find("the mass of x is negative at the start") != std::string::npos);
+    CHECK(run(of_mass("1")).err.empty());
+    // A metric of relativity: a light ray's neighbour around a black hole.
+    const test::Finished geodesic =
+        run("lagrangian = \"(r'^2/(1 - 2/r) - (1 - 2/r)*w'^2 + r^2*phi'^2)/2\"\n[coordinates]\nr = { position = 10, "
+            "velocity = "
+            "0 }\nw = { position = 0, velocity = 1.2 }\nphi = { position = 0, velocity = 0.04 }\n[run]\nstep = "
+            "0.5\nuntil = 20\n");
+    CHECK_MESSAGE(geodesic.err.empty(), geodesic.err);
+}

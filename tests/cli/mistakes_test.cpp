@@ -42,6 +42,9 @@ TEST_CASE("slips of a blackboard are told how they are written") {
     CHECK(test::contains(told(oscillator("x'^2/2 - e^x", "step = 0.1")), "Write exp(...)."));
     CHECK(test::contains(told(oscillator("(x'^2 + y'^2)/2", "step = 0.1")),
                          "A coordinate y needs a line y = { position = ..., velocity = ... } under [coordinates]."));
+    CHECK(test::contains(told("definitions = { foot = \"2*x\" }\n" +
+                              oscillator("x'^2/2 - x^2/2", "step = 0.1\n[forces]\nfoot = \"-fot'\"")),
+                         "Did you mean 'foot''?"));
     CHECK(test::contains(told("L = \"x'^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"),
                          "Write lagrangian = \"...\"."));
     const std::string plane =
@@ -79,7 +82,7 @@ TEST_CASE("keys, options and quotes in the wrong place are told the right one") 
     const std::string good = "x'^2/2 - x^2/2";
     CHECK(test::contains(told(oscillator(good, "step = 0.1\nevents = [\"x = 0\"]")), "It belongs into [output]."));
     CHECK(test::contains(told(oscillator(good, "step = 0.1", "[method]\nsplitting = 11\n")),
-                         "Write family = \"splitting\" and stages = 11."));
+                         "Write family = \"splitting\", and this number as stages."));
     CHECK(test::contains(told(oscillator(good, "step = 0.1\nstop = \"x < 0\"")), "an event is written a = b falling"));
     CHECK(test::contains(told(oscillator(good, "step = 0.1"), 2, {"--set", "x=2"}),
                          "'x' is a coordinate, whose start stands in"));

@@ -151,6 +151,7 @@ TEST_CASE("correct code passes at rest, far from zero and near it, and where ene
     for (const Motion& motion : std::vector<Motion>{{"q'^2/2 + cos(q)", "\"pi\"", "0.1", "at rest  ok"},
                                                     {"q'^2/2 + cos(q)", "1e6", "0.1", "ok"},
                                                     {"q'^2/2 + cos(q)", "1e-30", "0.1", "ok"},
+                                                    {"q'^2/2 + cos(q - 1)", "\"1 + 1e-8\"", "0.01", "ok"},
                                                     {"q'^2/2 - q^2/2", "1e300", "0.1", "energy too large  not judged"},
                                                     {"q'^2/2 - q^2/2", "1", "31", "ok"}}) {
         const std::string start = std::string("q = { position = ") + motion.position + ", velocity = 0 }";

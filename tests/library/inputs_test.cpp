@@ -16,6 +16,7 @@
 namespace {
 
 namespace lob = lobatto::api;
+namespace test = lobatto::test;
 
 // A scene of one coordinate q that starts at 1 with momentum 0, with the input u = 0.5.
 std::string scene_of(const std::string& lagrangian, const std::string& more, const std::string& step = "0.05") {
@@ -436,22 +437,24 @@ TEST_CASE("an emitted kernel with inputs, a wall and an event takes the steps of
     const std::string text = scene_of("q'^2/2 - q^2/2 - 10*max(q - u + 1.2, 0)^2",
                                       "[output]\nevents = [\"q = 0.1\"]\n[method]\npoints = 5\n", "0.1");
     // Inputs that are set begin the iteration anew, also to the same value; the library leaves that out.
-    const std::string printed =
-        printed_by("driven", text,
-                   "#include \"driven.hpp\"\n#include <cstdio>\nint main() {\n"
-                   "    lobatto::HybridStepper<lobatto::kernels::driven> stepper;\n"
-                   "    lobatto::kernels::driven::Parameters values;\n"
-                   "    const double q[] = {1}, p[] = {0};\n"
-                   "    if (stepper.prepare(values, 0.1) != lobatto::Status::ok) return 1;\n"
-                   "    if (stepper.start(0, q, p) != lobatto::Status::ok) return 2;\n"
-                   "    long met = 0;\n"
-                   "    for (int i = 0; i < 80; ++i) {\n"
-                   "        values.u = i % 16 < 8 ? 1.5 : 0.75;\n"
-                   "        if (i % 8 == 0 && stepper.set_inputs(values) != lobatto::Status::ok) return 3;\n"
-                   "        if (stepper.step() != lobatto::Status::ok) return 4;\n"
-                   "        met += stepper.events();\n    }\n"
-                   "    double momentum;\n    stepper.momentum(&momentum);\n"
-                   "    std::printf(\"%.17g %.17g %ld\\n\", stepper.q()[0], momentum, met);\n}\n");
+    const std::string printed = printed_by(
+        "driven", text,
+        "#include \"driven.hpp\"\n#include <cstdio>\nint main() {\n"
+        "    lobatto::HybridStepper<lobatto::kernels::driven> stepper;\n"
+        "    lobatto::kernels::driven::Parameters values;\n"
+        "    const double q[] = {1}, p[] = {0};\n"
+        "    if (stepper.prepare(values, 0.1) != lobatto::Status::ok) return 1;\n"
+        "    if (stepper.start(0, q, p) != lobatto::Status::ok) return 2;\n"
+        "    long met = 0;\n"
+        "    for (int i = 0; i < 80; ++i) {\n"
+        "        values.u = i % 16 < 8 ? 1.5 : 0.75;\n"
+        "        if (i % 8 == 0 && stepper.set_inputs(values) != lobatto::Status::ok) return 3;\n"
+        "        if (stepper.step() != lobatto::Status::ok) return 4;\n"
+        "        met += stepper.events();\n    }\n"
+        "    double momentum, velocity, H;\n    stepper.momentum(&momentum);\n"
+        "    if (stepper.velocity(&velocity) != lobatto::Status::ok) return 5;\n"
+        "    if (stepper.energy(&H) != lobatto::Status::ok) return 6;\n"
+        "    std::printf(\"%.17g %.17g %ld %.17g %.17g\\n\", stepper.q()[0], momentum, met, velocity, H);\n}\n");
     lob::Stepper stepper = stepper_of(text);
     long met = 0;
     for (int i = 0; i < 80; ++i) {
@@ -459,11 +462,159 @@ TEST_CASE("an emitted kernel with inputs, a wall and an event takes the steps of
         stepper.step();
         met += static_cast<long>(stepper.take_events().size());
     }
-    double q = 0, p = 0;
+    double q = 0, p = 0, velocity = 0, energy = 0;
     long emitted_met = 0;
-    REQUIRE(std::sscanf(printed.c_str(), "%lf %lf %ld", &q, &p, &emitted_met) == 3);
+    REQUIRE(std::sscanf(printed.c_str(), "%lf %lf %ld %lf %lf", &q, &p, &emitted_met, &velocity, &energy) == 5);
+    CHECK(velocity == stepper.velocity()[0]);
+    CHECK(energy == stepper.energy());
     CHECK(q == stepper.q()[0]);
     CHECK(p == stepper.p()[0]);
     CHECK(emitted_met == met);
     CHECK(met > 0);
+}
+
+TEST_CASE("the derivative of a step by an input is that of the step written by hand, and of the exact motion") {
+    // Leapfrog of q'' = -u^2 q, differentiated by hand.
+    lob::Stepper leapfrog = stepper_of(scene_of("q'^2/2 - u^2*q^2/2", "[method]\npoints = 2\n", "0.1"));
+    leapfrog.step();
+    leapfrog.set("u", 1.7);
+    const double h = 0.1, u = 1.7, q = leapfrog.q()[0], p = leapfrog.p()[0], q1 = q + h * (p - h / 2 * u * u * q),
+                 dq = -h * h * u * q, dp = -h * u * (q + q1) - h / 2 * u * u * dq;
+    const std::vector<double> by_u = leapfrog.sensitivity("u");
+    CHECK(std::fabs(by_u[0] - dq) < 1e-12);
+    CHECK(std::fabs(by_u[1] - dp) < 1e-12);
+    CHECK(leapfrog.q()[0] == q);
+    CHECK(leapfrog.parameter("u") == 1.7);
+
+    // q'' = -4 q + u, whose step of order 8 is the motion to rounding: what a force that is held does in it.
+    const lob::Stepper held = stepper_of(scene_of("q'^2/2 - 2*q^2 + u*q", "[method]\npoints = 6\n"));
+    const std::vector<double> force = held.sensitivity("u");
+    CHECK(std::fabs(force[0] - (1 - std::cos(2 * 0.05)) / 4) < 1e-13);
+    CHECK(std::fabs(force[1] - std::sin(2 * 0.05) / 2) < 1e-12);
+
+    // A mass that is no input; the wall of a ball whose impact an input moves.
+    const std::string ball =
+        "lagrangian = \"m*q'^2/2 - m*k*q^2/2\"\n[coordinates]\nq = { position = 1, momentum = 3 }\n[parameters]\n"
+        "m = 1.5\nk = 2\n[run]\nstep = 0.05\nuntil = 1\n[method]\npoints = 6\n";
+    const std::vector<double> by_mass = stepper_of(ball).sensitivity("m");  // q = cos + p/(m w) sin
+    const double w = std::sqrt(2.0);
+    CHECK(std::fabs(by_mass[0] + 3 / (1.5 * 1.5 * w) * std::sin(w * 0.05)) < 1e-12);
+    CHECK(std::fabs(by_mass[1] + w * std::sin(w * 0.05)) < 1e-12);
+    // It flies from 1 at rest with the acceleration u = -50, and comes back from the wall at 0.98: q1 = 0.98 +
+    // 0.8 (v t - ...) by hand, with t_hit = sqrt(0.04/50).
+    lob::Stepper bouncing =
+        stepper_of(scene_of("q'^2/2 + u*q", "[impacts]\nfloor = { when = \"q = 0.98 falling\", restitution = 0.8 }\n"));
+    bouncing.set("u", -50);
+    const auto bounced = [](double a) {  // its momentum after 0.05
+        const double hit = std::sqrt(0.04 / a);
+        return 0.8 * a * hit - a * (0.05 - hit);
+    };
+    const double slope = -(bounced(50.001) - bounced(49.999)) / 0.002;
+    CHECK(std::fabs(bouncing.sensitivity("u")[1] - slope) < 1e-7);
+}
+
+TEST_CASE(
+    "derivatives by an input are those beside its value, whatever its size and however formulas go on elsewhere") {
+    struct Row {
+        std::string force;  // of u
+        double u, slope;
+    };
+    for (const Row& row :
+         {Row{"exp(-u^2)", 0.5, -std::exp(-0.25)}, Row{"exp(-((u - 3)/0.1)^2)", 3.05, -10 * std::exp(-0.25)},
+          Row{"1/(1 + u^2)", 0.5, -0.64}, Row{"sqrt(u)", 1e-9, 0.5 / std::sqrt(1e-9)},
+          Row{"sin(1e6*u)", 0.3, 1e6 * std::cos(3e5)}, Row{"cos(u)", 0, 0}, Row{"1e6*u", 0, 1e6}, Row{"u^3", 0, 0},
+          Row{"1e-7*u", 0, 1e-7}, Row{"max(u, 0)", 1e-3, 1}}) {
+        CAPTURE(row.force);
+        lob::Stepper stepper = stepper_of(scene_of("q'^2/2 + q*" + row.force, "", "0.05"));
+        stepper.set("u", row.u);
+        const std::vector<double> by_u = stepper.sensitivity("u");  // q1 = 1 + h^2/2 f, p1 = h f
+        CHECK(std::fabs(by_u[0] - 0.00125 * row.slope) <= 1e-6 * std::fabs(0.00125 * row.slope) + 1e-12);
+        CHECK(std::fabs(by_u[1] - 0.05 * row.slope) <= 1e-8 * std::fabs(0.05 * row.slope) + 1e-13);
+    }
+}
+
+TEST_CASE("where a step has no derivative by an input, that is said") {
+    const auto complaint = [](const std::string& more, double u) {
+        lob::Stepper stepper = stepper_of(scene_of("q'^2/2 + u*q", more));
+        stepper.set("u", u);
+        return test::message_of<lob::ComputationError>([&] { static_cast<void>(stepper.sensitivity("u")); });
+    };
+    // The step ends at a stop.
+    CHECK(
+        complaint("stop = \"q = 0.99\"\n", -50).starts_with("sensitivity: the step from here has no derivative by u"));
+    // With more of the force the motion just reaches a wall, with less it does not.
+    const std::string wall = "[impacts]\nfloor = { when = \"q = 0.9375 falling\" }\n";
+    CHECK(complaint(wall, -50).starts_with("sensitivity: the step from here has no derivative by u"));
+    CHECK(complaint(wall, -40).empty());
+    for (const std::string corner : {"max(u, 0)", "abs(u)"}) {
+        lob::Stepper pusher = stepper_of(scene_of("q'^2/2 + q*" + corner, ""));
+        pusher.set("u", 0);
+        CHECK_THROWS_AS(static_cast<void>(pusher.sensitivity("u")), lob::ComputationError);
+    }
+    CHECK(test::message_of<lob::InputError>([&] {
+              static_cast<void>(stepper_of(scene_of("q'^2/2 + u*q", "")).sensitivity("w"));
+          }).starts_with("unknown parameter 'w'; declared: u."));
+}
+
+TEST_CASE("an input that a control loop brings below the least number is 0, a parameter is refused") {
+    lob::Stepper stepper =
+        stepper_of(scene_of("q'^2/2 + u*q", "[parameters]\nm = 1\n[output]\nkeep = [\"max(m*q)\"]\n"));
+    stepper.set("u", 1e-305);
+    CHECK(stepper.parameter("u") == 0);
+    CHECK_THROWS_AS(stepper.set("u", std::nan("")), lob::InputError);
+    CHECK_THROWS_AS(stepper.set("m", 1e-305), lob::InputError);
+}
+
+TEST_CASE("a value that no step can be taken with leaves the one before, and says so") {
+    lob::Stepper stepper = stepper_of(scene_of("(2 - u)*q'^2/2 - q^2/2", ""));
+    stepper.step();
+    const double q = stepper.q()[0];
+    const std::string text = test::message_of<lob::ComputationError>([&] { stepper.set("u", 2); });
+    CHECK(text.starts_with("the new value is not taken, the one before stays: "));
+    CHECK(stepper.parameter("u") == 0.5);
+    CHECK(stepper.step());
+    CHECK(stepper.q()[0] != q);
+}
+
+TEST_CASE("what follows from the coordinates stands beside them, as in a run") {
+    const std::string arm =
+        "lagrangian = \"-9.81*arm.y\"\n[bodies]\narm = { mass = 1, inertia = 0.1, position = [0.5, 0] }\n[joints]\n"
+        "hinge = { type = \"hinge\", bodies = [\"ground\", \"arm\"], point = [0, 0], angle = 0.4 }\n[run]\nstep = "
+        "0.01\nuntil = 0.1\n";
+    lob::Stepper stepper = stepper_of(arm);
+    CHECK(stepper.column_names() == std::vector<std::string>{"arm_x", "arm_y", "arm_angle", "arm_omega"});
+    for (int i = 0; i < 10; ++i) stepper.step();
+    const lob::Trajectory run = lob::run(lob::Scene::from_text(arm, "inputs.toml"));
+    REQUIRE(run.column_names == stepper.column_names());
+    const std::vector<double> columns = stepper.columns();
+    for (std::size_t k = 0; k < 4; ++k) CHECK(columns[k] == run.columns[10 * 4 + k]);
+    CHECK(std::fabs(columns[0] - 0.5 * std::cos(stepper.q()[0])) < 1e-15);
+    CHECK(columns[3] == stepper.velocity()[0]);
+    // A name of the scene's own stays its own.
+    const lob::Stepper named =
+        stepper_of("definitions = { arm_x = \"2*arm.x\" }\n" + arm + "[output]\nkeep = [\"max(arm_x)\"]\n");
+    CHECK(named.column_names().front() == "arm_x_");
+}
+
+TEST_CASE("a motion that rests on a wall ends a loop over its steps") {
+    lob::Stepper ball = stepper_of(
+        "lagrangian = \"y'^2/2 - 10*y\"\n[coordinates]\ny = { position = 5, velocity = 0 }\n[impacts]\n"
+        "floor = { when = \"y = 0 falling\", restitution = 0, rest = 0.01 }\n[run]\nstep = 0.03\nuntil = 2\n");
+    int steps = 0;
+    while (ball.step()) ++steps;
+    CHECK(steps == 33);
+    CHECK(std::fabs(ball.t() - 1) < 1e-14);
+    CHECK(test::message_of<lob::ComputationError>([&] {
+              ball.step();
+          }).find("the motion came to rest on 'floor: y = 0 falling', and a step leads nowhere") != std::string::npos);
+    CHECK(std::fabs(ball.t() - 1) < 1e-14);
+    // In a step of another length too; a start elsewhere moves it again.
+    const double up = 5, still = 0;
+    ball.start(0, &up, &still);
+    CHECK(ball.advance_to(0.985));
+    CHECK(!ball.advance_to(1.01));
+    CHECK(std::fabs(ball.t() - 1) < 1e-14);
+    ball.start(0, &up, &still);
+    CHECK(ball.advance_to(0.5));
+    CHECK(std::fabs(ball.q()[0] - 3.75) < 1e-13);
 }

@@ -55,6 +55,13 @@ static void turn(const char* path) {
     double T[4], omega = 0;
     check(lobatto_integrator_tangent(pendulum, T) == 0, lobatto_integrator_message(pendulum));
     check(fabs(T[0] * T[3] - T[1] * T[2] - 1) < 1e-14, "a step keeps areas");
+    double by_omega[2];
+    check(lobatto_integrator_sensitivity(pendulum, "omega", by_omega) == 0, lobatto_integrator_message(pendulum));
+    check(by_omega[1] < 0, "a stronger force from q = 1");
+    const double* columns = NULL;
+    size_t beside = 1;
+    check(lobatto_integrator_columns(pendulum, &columns, &beside) == 0 && beside == 0, "nothing is eliminated");
+    check(lobatto_integrator_column(pendulum, 0) == NULL, "so nothing has a name");
     check(lobatto_integrator_set(pendulum, "omega", 5) == 0, lobatto_integrator_message(pendulum));
     check(lobatto_integrator_parameter(pendulum, "omega", &omega) == 0 && omega == 5, "what was set");
     printf("unknown: status %d, ", lobatto_integrator_parameter(pendulum, "omga", &omega));

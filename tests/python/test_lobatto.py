@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """The Python module: one trajectory, many, choosing, errors, what it costs."""
 
+import copy
 import fractions
 import multiprocessing
 import os
@@ -11,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 
 import numpy
 import pytest
@@ -273,7 +275,7 @@ def test_a_stepper_goes_where_it_is_sent(pendulum):
     assert stepper.parameter("omega") == 3
     tangent = other.tangent()
     assert abs(numpy.linalg.det(tangent) - 1) < 1e-13
-    with pytest.raises(lobatto.InputError, match="needs 1 numbers"):
+    with pytest.raises(lobatto.InputError, match="is a list of 1 number, such as"):
         stepper.start(0, [1, 2], [0, 0])
 
 
@@ -565,3 +567,44 @@ def test_a_lagrangian_without_velocities_or_without_its_time_is_told_in_words_of
         lobatto.Lagrangian("x'^2/2 - x^2/2 + x*cos(t)", x=(1, 0))
     with pytest.raises(lobatto.InputError, match="give the parameter another name"):
         lobatto.Lagrangian("x'^2/2 - t*x^2/2", x=(1, 0), t=2)
+
+def test_a_stepper_is_linearised_and_knows_what_follows(tmp_path):
+    cart = lobatto.Lagrangian("x'^2/2 - 2*x^2 + u*x", x=(1, 0.3), u=0, inputs=["u"], step=0.05, method=dict(points=6))
+    stepper = lobatto.Stepper(cart)
+    assert abs(stepper.sensitivity("u")[0] - (1 - numpy.cos(0.1))/4) < 1e-13
+    assert stepper.columns == {} and stepper.next_time == 0.05
+    other = copy.deepcopy(stepper)
+    other.step()
+    assert other.t == 0.05 and stepper.t == 0 and copy.copy(other).q[0] == other.q[0]
+    with pytest.raises(lobatto.InputError, match="'x' is a coordinate"):
+        lobatto.Lagrangian("x'^2/2", x=(1, 0), inputs=["x"])
+    scene = tmp_path/"arm.toml"
+    scene.write_text("""lagrangian = "-9.81*arm.y"
+[bodies]
+arm = { mass = 1, inertia = 0.1, position = [0.5, 0] }
+[joints]
+s = { type = "hinge", bodies = ["ground", "arm"], point = [0, 0], angle = 0.4 }
+[run]
+step = 0.01
+until = 0.1
+""")
+    stepper = lobatto.Stepper(str(scene), points=3)
+    run = lobatto.run(str(scene), points=3)
+    assert stepper.columns["arm_y"] == run["arm.y"][0] and numpy.array_equal(run["s.angle"], run["s_angle"])
+
+
+def test_the_linearised_steps_of_the_documents_balance_a_rod():
+    linalg = pytest.importorskip("scipy.linalg")
+    text = (pathlib.Path(__file__).parents[2]/"docs"/"python.md").read_text()
+    blocks = [block.split("```")[0] for block in text.split("```python\n")[1:]]
+    written = [next(block for block in blocks if part in block) for part in ("A rod on a cart", "solve_discrete_are")]
+    known = {"lobatto": lobatto, "numpy": numpy, "scipy": types.SimpleNamespace(linalg=linalg)}
+    for block in written:
+        exec(block, known)  # pylint: disable=exec-used
+    closed = known["A"] - known["B"] @ known["gains"][None]
+    assert 0.9 < abs(numpy.linalg.eigvals(closed)).max() < 1 < abs(numpy.linalg.eigvals(known["A"])).max()
+    cart = lobatto.Stepper(known["scene"])
+    while cart.t < 10:
+        cart.set("push", float(-known["gains"] @ numpy.concatenate([cart.q, cart.p])))
+        cart.step()
+    assert abs(cart.q).max() < 1e-3

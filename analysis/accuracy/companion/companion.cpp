@@ -315,6 +315,7 @@ void Companion::compare_at_stop(double longest) {
     if (place.status != LOBATTO_OK) return;
     const std::vector<double> row = place.rounded_row();
     widen_to(way_.least, way_.most, row.data(), row.size());
+    stopped_.reset();
     run_.push_back(stop_);
     companion_.push_back({at_stop, place.row()});
     companion_ranges_.push_back(std::exchange(way_, {}));
@@ -444,6 +445,10 @@ std::optional<MeasuredError> Companion::finish(const TrajectoryResult& result, c
     }
     cancelled_ = true;
     if (thread_.joinable()) thread_.join();
+    // A companion that fails in the step of the stop may have gone too far: to where the motion rests.
+    if (has_end && stopped_ && !stop_time_.empty() &&
+        std::fabs(stop_time_.front() - *stopped_) <= std::fabs(request_.step))
+        run_.resize(std::min(run_.size(), companion_.size()));
     if (has_end && result.stop >= 0 && goes_on())
         compare_at_stop(is_finer_ || result.seconds < short_run ? std::numeric_limits<double>::infinity()
                                                                 : result.seconds / 2);

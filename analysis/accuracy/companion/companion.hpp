@@ -115,6 +115,8 @@ private:
     std::vector<double> amplitudes(std::size_t comparisons) const;
     std::vector<double> row_at(std::size_t comparison) const;
     bool run_rests() const;
+    // Whether it rests because rounding holds it.
+    bool is_held(const std::vector<double>& amplitude) const;
     void look_at_paces(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& of_run,
                        const std::vector<double>& of_companion) const;
     MeasuredError compare(const TrajectoryResult& result) const;

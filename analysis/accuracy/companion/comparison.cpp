@@ -159,6 +159,15 @@ bool Companion::run_rests() const {
     return place.status == LOBATTO_OK && rests(start, range.least, range.most, run_epsilon_);
 }
 
+bool Companion::is_held(const std::vector<double>& amplitude) const {
+    const bool has_none = std::all_of(amplitude.begin(), amplitude.end(), [](double size) { return size == 0; });
+    if (!has_none || is_driven_ || is_clocked() || contacts_.is_sought() || kernel_->real_kind != LOBATTO_DOUBLE)
+        return false;
+    LoadedStepper<double> stepper(kernel_);
+    return stepper.prepare(request_.whole_parameters, request_.step) == LOBATTO_OK &&
+           is_held_by_rounding(stepper, request_.time, request_.q, request_.p, request_.step, request_.steps);
+}
+
 // A wrong motion may grow, and its amplitude with it. When it began to be wrong is told by the amplitude until then.
 void Companion::lose_where_it_began(MeasuredError& error, const std::vector<double>& amplitude, double of_run) const {
     constexpr double least = 1e-3;  // of the amplitude: what is less may be rounding
@@ -213,6 +222,8 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
         error.lost_q = request_.q;
         error.lost_p = request_.p;
     }
+    if (!error.lost_after && count > 0 && is_held(amplitude))
+        lose(error, time_of(run_[count - 1]), run_[count - 1].row);
     error.complete = count == run_.size();
     error.rests = run_rests();
     if (!error.rests) error.doubling = doubling_of(course);  // else what grows are amplitudes, of the companion
@@ -224,7 +235,8 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     }
     // Two motions so far apart may be near one another at one time, as pendulums are where they turn: the largest
     // difference is what is known.
-    const Distance& known = worst.relative > by_chance ? worst : last;
+    error.end_is_largest = worst.relative > by_chance && last.relative < worst.relative;
+    const Distance& known = error.end_is_largest ? worst : last;
     error.end = known.relative;
     error.absolute = known.absolute;
     error.coordinate = known.coordinate;

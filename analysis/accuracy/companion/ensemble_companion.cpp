@@ -336,6 +336,13 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
         largest = std::fmax(largest, error.relative);
     }
     if (largest > by_chance) error.relative = largest;
+    const bool rests = std::all_of(amplitude.begin(), amplitude.end(), [](double size) { return size == 0; });
+    if (rests && comparisons > 0 && outline_.system.autonomous && !outline_.scene.clock && !outline_.scene.is_cut() &&
+        kernel_->real_kind == LOBATTO_DOUBLE && stepper_.prepare(start.parameters, request_.step) == LOBATTO_OK) {
+        const double* const first = kept.rows;
+        const std::vector<double> q(first + 1, first + 1 + n), p(first + 1 + n, first + 1 + 2 * n);
+        if (is_held_by_rounding(stepper_, first[0], q, p, request_.step, request_.steps)) return {1, true};
+    }
     return error;
 }
 

@@ -13,7 +13,10 @@ std::string text_of(const MeasuredError& error, const Scene& scene) {
                            *error.lost_after);
     if (error.lost_after)
         return fmt::format("as large as the motion itself from t = {:.4g} on{}", *error.lost_after, chaos);
-    const std::string place = error.complete ? "at the end" : fmt::format("at t = {:.4g}", error.until);
+    const std::string place = error.end_is_largest
+                                  ? (error.complete ? "at most" : fmt::format("at most, to t = {:.4g}", error.until))
+                              : error.complete ? "at the end"
+                                               : fmt::format("at t = {:.4g}", error.until);
     std::string text = error.largest > 3 * error.end
                            ? fmt::format("{:.1e} of the amplitude at most; {} {:.1e}", error.largest, place, error.end)
                            : fmt::format("{:.1e} of the amplitude {}", error.end, place);

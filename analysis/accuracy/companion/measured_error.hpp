@@ -15,12 +15,13 @@ namespace lobatto {
 inline constexpr double large_error = 0.01;  // of the amplitude: worth a warning whoever asked
 
 struct MeasuredError {
-    double end = 0;              // at `until`: of the positions, relative to the amplitude of each; the largest
-    std::size_t coordinate = 0;  // of which it is
-    double absolute = 0;         // the same in its unit
-    double largest = 0;          // over all comparisons
-    double until = 0;            // the time of the last comparison
-    bool complete = false;       // that is the end of the run
+    double end = 0;               // at `until`: of the positions, relative to the amplitude of each; the largest
+    std::size_t coordinate = 0;   // of which it is
+    double absolute = 0;          // the same in its unit
+    double largest = 0;           // over all comparisons
+    double until = 0;             // the time of the last comparison
+    bool complete = false;        // that is the end of the run
+    bool end_is_largest = false;  // `end` is the largest error so far: the two are near again, perhaps by chance
     // `end`; of what was not compared, as errors of this run grew so far; not a number where that is far more than what
     // was compared.
     double at_end = 0;

@@ -149,10 +149,32 @@ std::string escape_of(const Scene& scene, const std::vector<double>& velocity, d
         result.time, list_text(result.q), list_text(result.p), scene.clock->text, lasts, lasts * speed / distance);
 }
 
+// Of a start that was refused. Empty: it is behind no wall.
+std::string behind_wall(const Scene& scene, const TrajectoryRequest& request, const TrajectoryResult& result) {
+    std::vector<GiNaC::symbol> symbols;
+    for (const Parameter& parameter : scene.parameters) symbols.push_back(parameter.symbol);
+    symbols.push_back(scene.time);
+    for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
+    std::vector<double> values = request.parameters;
+    values.push_back(result.time);
+    values.insert(values.end(), result.q.begin(), result.q.begin() + std::ssize(scene.coordinates));
+    for (const Impact& impact : scene.impacts) {
+        const std::optional<Tape> tape = Tape::of(scene.along_motion(impact.when.value), symbols);
+        const double value = tape ? (*tape)(values) : 0;
+        if (value * impact.when.direction <= 0) continue;  // falling: above zero
+        return fmt::format(
+            "the run cannot begin at t = {:.6g}, from q = {}, p = {}: the start is behind the wall {} ({}), whose left "
+            "side minus its right side is {:.3g} there. Start on its other side.",
+            result.time, list_text(result.q), list_text(result.p), impact.written, impact.when.text, value);
+    }
+    return "";
+}
+
 }  // namespace
 
 std::string stopped_at_formula(const Scene& scene, const Domains& domains, const Kernel& kernel,
                                const TrajectoryRequest& request, const TrajectoryResult& result) {
+    if (result.status == LOBATTO_OFF_CONSTRAINTS && !result.started) return behind_wall(scene, request, result);
     const bool has_failed = result.status == LOBATTO_NOT_FINITE || result.status == LOBATTO_NOT_CONVERGED ||
                             (scene.clock && result.status == LOBATTO_TIME_STANDS_STILL);
     if (!has_failed || !result.started) return "";

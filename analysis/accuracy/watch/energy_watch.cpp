@@ -104,9 +104,14 @@ struct KineticCourse {
 
 constexpr double halved = 0.5, off_dead_points = 0.47;  // a half of the step may end at the dead point, too
 
-std::string why(const Scene& scene, double step, bool too_coarse) {
+std::string why(const Scene& scene, double step, bool jumps, bool too_coarse) {
     const auto jump = std::find_if(scene.switches.begin(), scene.switches.end(),
                                    [&](const Switch& one) { return scene.lagrangian.has(one.side); });
+    if (jump != scene.switches.end() && !jumps)
+        return fmt::format(
+            "The step is too long for the forces met there, or the Lagrangian jumps where it goes from one piece to "
+            "another ({}): try a smaller step, such as h = {:.6g}; both pieces need one value there.",
+            jump->text, step / 2);
     if (jump != scene.switches.end())
         return fmt::format(
             "The Lagrangian jumps where it goes from one piece to another ({}), which no motion follows, or the step "
@@ -181,8 +186,8 @@ EnergyWatch::States EnergyWatch::rows_of_some() const {
 }
 
 // In 60 digits: of small motions the energy in double is rounding.
-std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
-                                   const TrajectoryRequest& request) const {
+std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request,
+                                   bool jumps) const {
     LoadedStepper<double> stepper(kernel);
     if (leaving_.size() < 2 || stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
         is_at_rest(outline.system, rows_of_some(), request.parameters, kernel->epsilon))
@@ -245,7 +250,7 @@ std::string EnergyWatch::departure(const Outline& outline, const Kernel& kernel,
         error ? fmt::format("is off there by {:.2g} of the mean kinetic energy{}",
                             cln::double_approx(*error) / scale_at(state), scale_at(state) < mean ? " until then" : "")
               : "is no real number there",
-        why(outline.scene, request.step, too_coarse));
+        why(outline.scene, request.step, jumps, too_coarse));
 }
 
 }  // namespace lobatto

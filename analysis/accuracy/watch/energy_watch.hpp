@@ -29,7 +29,9 @@ public:
     // The first such state, where the energy is off by half of the mean kinetic energy, and by more than rounding of
     // the positions explains, or not real: no path of this Lagrangian goes there. What to tell of it, as of any stop;
     // empty: there is none.
-    std::string departure(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request) const;
+    // `jumps`: whether the Lagrangian was seen to jump (jumps_of).
+    std::string departure(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request,
+                          bool jumps = false) const;
 
 private:
     using States = std::vector<std::vector<double>>;  // t, q, p

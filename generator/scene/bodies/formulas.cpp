@@ -224,8 +224,13 @@ void SystemReader::Bodies::read_start(JointLine& line) {
     for (const Entry* entry : {start, rate}) {
         if (entry == nullptr) continue;
         if (line.joint.closes)
-            fail(entry->at, fmt::format("joint {} closes a loop, so that the other joints tell its start; leave out {}",
-                                        line.joint.name, entry->key));
+            fail(entry->at,
+                 line.joint.asked_for
+                     ? fmt::format(
+                           "joint {} is a constraint, so that its bodies tell its start in [bodies]; leave out {}",
+                           line.joint.name, entry->key)
+                     : fmt::format("joint {} closes a loop, so that the other joints tell its start; leave out {}",
+                                   line.joint.name, entry->key));
         (entry == start ? line.start : line.rate) = formula(*entry, line.joint.name);
     }
 }
@@ -344,10 +349,16 @@ void SystemReader::Bodies::draw(const RigidBody& body) {
     reader_.scene_.bodies.push_back(drawn);
 }
 
-// In columns of the trajectory, what is no coordinate: how it is turned, and how it turns, in its own frame.
+// In columns of the trajectory, what is no coordinate: where it is, if it hangs on a joint, how it is turned, and how
+// it turns, in its own frame.
 void SystemReader::Bodies::show(const Line& line) {
     const RigidBody& body = line.body;
     std::vector<Column>& columns = reader_.scene_.outputs.columns;
+    for (std::size_t k = 0; line.joint && k < (body.plane ? 2 : 3); ++k) {
+        std::string name = body.name + "_" + axis_names[k];
+        while (reader_.declarations_.is_taken(name)) name += '_';  // by something of the scene's own
+        columns.push_back({name, "", body.x[k]});
+    }
     if (body.plane) {
         if (line.joint) columns.push_back({body.name + "_angle", "", body.angle});
         columns.push_back({body.name + "_omega", "", body.omega[2]});

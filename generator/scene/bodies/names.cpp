@@ -118,7 +118,9 @@ void SystemReader::Bodies::declare_joint(const Entry& entry) {
     Line& second = lines_[joint.second];
     if (second.body.plane && joint.type == Joint::Type::ball)
         fail(given->value.at, "in a plane a ball is a hinge: write type = \"hinge\"");
-    joint.closes = second.joint.has_value() || hangs_on(joint.first, joint.second);
+    const Entry* const asked = line.table.find("constraint");
+    joint.asked_for = asked != nullptr && boolean_of(source_, *asked);
+    joint.closes = joint.asked_for || second.joint.has_value() || hangs_on(joint.first, joint.second);
     if (!line.constrains()) second.joint = joints_.size();
     joints_.push_back(line);
 }

@@ -65,6 +65,7 @@ struct Joint {
     std::optional<std::size_t> first;  // none: the ground
     std::size_t second = 0;
     bool closes = false;         // a loop: by constraints
+    bool asked_for = false;      // these constraints, though there is no loop
     Vector point = {}, to = {};  // in space, as drawn; a distance leads from the point on the first body
     Vector axis = {};            // of length 1
     std::optional<GiNaC::ex> length;

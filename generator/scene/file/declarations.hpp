@@ -18,6 +18,8 @@ public:
     void declare(const std::string& name, Position at, const std::string& what);
     void declare_elements(const std::string& array, Position at, std::size_t count);
 
+    bool is_taken(const std::string& name) const { return taken_.contains(name); }
+
     Names names;
 
 private:

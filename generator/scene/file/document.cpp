@@ -154,10 +154,12 @@ std::string explanation(std::string_view description) {
     const auto is_readable = [](unsigned char c) { return c >= ' ' && c < 0x7f; };
     if (!std::all_of(description.begin(), description.end(), is_readable))
         description = description.substr(0, description.find(", saw '"));
+    const bool prime = description.find("expected a comment or whitespace, saw") != std::string_view::npos;
     const bool point = description.find("expected decimal digit, saw '.'") != std::string_view::npos;
     return fmt::format("not valid TOML: {}{}", description,
                        point     ? "; a number begins with a digit: write 0.5, not .5"
                        : formula ? "; a formula must stand in quotes"
+                       : prime   ? "; a formula with primes stands in double quotes, \"x'^2/2\""
                                  : "");
 }
 

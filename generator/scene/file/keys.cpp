@@ -54,16 +54,18 @@ const Key count_key = {"count", Holds::formula, "How many elements the array has
 std::vector<Key> joint_keys() {
     std::vector<std::string> types;
     for (const auto& [type, keys] : joint_types()) types.push_back(type);
-    return {required(word("type", types, "What the joint leaves free")),
-            required(key("bodies", Holds::texts, "The two bodies; the first may be \"ground\"")),
-            key("point", Holds::list, "Where it is, in space"),
-            key("axis", Holds::list, "Its direction, in space"),
-            key("angle", Holds::formula, "The angle at the start"),
-            key("position", Holds::formula, "The way along the axis at the start"),
-            key("velocity", Holds::formula, "The rate at the start"),
-            key("from", Holds::list, "The end on the first body, in space"),
-            key("to", Holds::list, "The end on the second body, in space"),
-            key("length", Holds::formula, "The distance; without it that of the two ends")};
+    return {
+        required(word("type", types, "What the joint leaves free")),
+        required(key("bodies", Holds::texts, "The two bodies; the first may be \"ground\"")),
+        key("point", Holds::list, "Where it is, in space"),
+        key("axis", Holds::list, "Its direction, in space"),
+        key("angle", Holds::formula, "The angle at the start"),
+        key("position", Holds::formula, "The way along the axis at the start"),
+        key("velocity", Holds::formula, "The rate at the start"),
+        key("from", Holds::list, "The end on the first body, in space"),
+        key("to", Holds::list, "The end on the second body, in space"),
+        key("length", Holds::formula, "The distance; without it that of the two ends"),
+        key("constraint", Holds::truth, "True: the second body keeps its coordinates, and equations hold it there")};
 }
 
 std::vector<Key> make_keys() {
@@ -99,6 +101,7 @@ std::vector<Key> make_keys() {
         lines("impacts", "Walls at which the motion is thrown back",
               {required(key("when", Holds::quoted, "The wall and its side, such as \"y = 0 falling\"")), count_key,
                key("restitution", Holds::formula, "The part of the normal velocity that is given back, 0 to 1"),
+               key("rest", Holds::formula, "The run ends at an impact that the motion leaves more slowly than this"),
                key("reset", Holds::names, "Positions and velocities after the impact, such as { \"x'\" = \"-x'\" }")}),
         section(
             "method", "How it is integrated",
@@ -152,9 +155,9 @@ const std::vector<Key>& keys_of_section(const std::string& section) {
 
 const std::vector<std::pair<std::string, std::vector<std::string>>>& joint_types() {
     static const std::vector<std::pair<std::string, std::vector<std::string>>> types = {
-        {"ball", {"type", "bodies", "point"}},
-        {"hinge", {"type", "bodies", "point", "axis", "angle", "velocity"}},
-        {"slider", {"type", "bodies", "axis", "position", "velocity"}},
+        {"ball", {"type", "bodies", "point", "constraint"}},
+        {"hinge", {"type", "bodies", "point", "axis", "angle", "velocity", "constraint"}},
+        {"slider", {"type", "bodies", "axis", "position", "velocity", "constraint"}},
         {"distance", {"type", "bodies", "from", "to", "length"}}};
     return types;
 }

@@ -30,7 +30,7 @@ std::string advice_for(const std::string& key, const std::vector<std::string>& k
     if (table == "[run]" && (key == "start" || key == "t0" || key == "begin" || key == "t_start"))
         return " A run begins at t = 0: write t + 5 for t in the formulas to begin at 5.";
     if (table == "a scene" && (key == "L" || key == "Lagrangian")) return " Write lagrangian = \"...\".";
-    if (table == "[method]" && key == "splitting") return " Write family = \"splitting\" and stages = 11.";
+    if (table == "[method]" && key == "splitting") return " Write family = \"splitting\", and this number as stages.";
     if (const std::string section = section_of(key); table.starts_with('[') && !section.empty())
         return fmt::format(" It belongs into [{}].", section);
     const auto found = others.find(key);
@@ -94,6 +94,9 @@ const Text& formula_of(const Source& source, const std::string& key, const Value
 
 long long integer_of(const Source& source, const Entry& entry, long long least, long long most,
                      const std::string& range) {
+    if (entry.value.kind == Value::Kind::real)
+        source.fail(entry.value.at, fmt::format("{} must be a whole number, written without a point, not {}", entry.key,
+                                                entry.value.text.value));
     if (entry.value.kind != Value::Kind::integer) fail_type(source, entry, "a whole number");
     if (entry.value.integer < least || entry.value.integer > most)
         source.fail(entry.value.at, fmt::format("{} is {}; {}", entry.key, entry.value.integer, range));

@@ -111,6 +111,9 @@ LOBATTO_C_API int lobatto_integrator_velocity(lobatto_integrator* integrator, do
 LOBATTO_C_API int lobatto_integrator_at(lobatto_integrator* integrator, double t, double* q, double* velocity);
 /* One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The motion stays where it is. Not with a clock. */
 LOBATTO_C_API int lobatto_integrator_tangent(lobatto_integrator* integrator, double* tangent);
+/* d(q1, p1)/d(parameter or input) of the same step, 2n, by differences: about ten digits. */
+LOBATTO_C_API int lobatto_integrator_sensitivity(lobatto_integrator* integrator, const char* parameter,
+                                                 double* derivative);
 LOBATTO_C_API int lobatto_integrator_parameter(lobatto_integrator* integrator, const char* parameter, double* value);
 /* What was met since the last call: *count events, until the next call. */
 LOBATTO_C_API int lobatto_integrator_take_events(lobatto_integrator* integrator, const lobatto_event** events,
@@ -118,6 +121,10 @@ LOBATTO_C_API int lobatto_integrator_take_events(lobatto_integrator* integrator,
 /* Of the constraints, here: *count numbers, until the next call. */
 LOBATTO_C_API int lobatto_integrator_multipliers(lobatto_integrator* integrator, const double** multipliers,
                                                  size_t* count);
+/* What follows from the coordinates, here: eliminated ones and their velocities, rotations and places of bodies. *count
+ * numbers, until the next call; their names. */
+LOBATTO_C_API int lobatto_integrator_columns(lobatto_integrator* integrator, const double** columns, size_t* count);
+LOBATTO_C_API const char* lobatto_integrator_column(const lobatto_integrator* integrator, size_t index);
 
 /* n: those of the scene. A clock adds the time as the last one where the energy changes; a start sets it, and its
  * momentum, whatever is given for them. */

@@ -145,6 +145,9 @@ public:
     const std::vector<Variable>& parameters() const;  ///< with the values of the settings; inputs too
     const std::vector<Variable>& inputs() const;
     const std::vector<std::string>& events() const;
+    /// What is no coordinate and follows from them: eliminated coordinates and their velocities; of bodies the
+    /// orientation and angular velocity, and the place of those on joints (docs/scene_format.md).
+    const std::vector<std::string>& column_names() const;
 
     struct Parts;
     explicit Kernel(std::shared_ptr<const Parts> parts);
@@ -209,14 +212,20 @@ public:
     /// H(t, q, p); not a number where the scene leaves it out (energy = false) and the motion does not conserve it.
     double energy() const;
     std::vector<double> multipliers() const;  ///< of the constraints, here
+    std::vector<double> columns() const;      ///< here, in the order of Kernel::column_names()
     /// Position and velocity inside the last step, on its own polynomial: t - step_size() <= t <= t(), or from where
-    /// advance_to() began its last step. InputError elsewhere, with a clock, after start() and set(), and in a step
-    /// that an impact, a switch or a stop has cut.
+    /// advance_to() began its last step. Positions are right at both ends, and between them to an order of points or
+    /// stages + 1 at most; velocities to one order less, also at the ends, where velocity() has them right. InputError
+    /// elsewhere, with a clock, after start() and set(), and in a step that an impact, a switch or a stop has cut.
     std::pair<std::vector<double>, std::vector<double>> at(double t) const;
     /// One step from here and its derivative: d(q1, p1)/d(q, p), 2n x 2n. The trajectory stays where it is. InputError
     /// with a clock, whose steps last as long as the motion makes them; ComputationError where a wall or a switch cuts
-    /// the step.
+    /// the step. It is the derivative of the whole step, also where a stop would end it.
     std::vector<double> tangent() const;
+    /// d(q1, p1)/d(parameter or input) of the same step, 2n, with about ten digits: by differences.
+    /// Where walls or switches cut the step, the derivative is that of the step with them. ComputationError where there
+    /// is none.
+    std::vector<double> sensitivity(const std::string& name) const;
 
     /// A parameter or an input, from the next step on. Another parameter prepares the kernel anew; what controls a
     /// motion should be an input of the scene, which costs at most about a step.
@@ -225,8 +234,9 @@ public:
     /// All inputs, in the order of inputs().
     void set_inputs(const double* values);
 
-    std::vector<EventHit> take_events();             ///< until t(), since the last call
-    const std::vector<std::string>& events() const;  ///< what EventHit::kind counts, as Scene::events()
+    const std::vector<std::string>& column_names() const;  ///< of columns(), as Kernel::column_names()
+    std::vector<EventHit> take_events();                   ///< until t(), since the last call
+    const std::vector<std::string>& events() const;        ///< what EventHit::kind counts, as Scene::events()
 
 private:
     struct Parts;
@@ -334,7 +344,7 @@ struct Sweep {
     std::size_t count = 0;              ///< trajectories; fewer than asked for where `progress` ended it
     std::vector<int> status;            ///< 0: reached the end, or a stop
     std::vector<std::int64_t> steps;    ///< taken
-    std::vector<int> stop;              ///< number of the stop from 1 on; 0: none
+    std::vector<int> stop;              ///< number of the stop from 1 on, then of all walls (`rest`); 0: none
     std::vector<double> t, q, p;        ///< the last state; count, count x n, count x n
     std::vector<double> energy_error;   ///< H - H(0); not numbers where the scene keeps no energy
     std::vector<double> error;          ///< measured, relative to the amplitude; empty when not asked for

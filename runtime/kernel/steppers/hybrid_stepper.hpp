@@ -56,8 +56,18 @@ public:
     real time() const { return stepper.time(); }
     const real* q() const { return stepper.q; }
     void momentum(real* p) const { stepper.momentum(p); }
-    // Of the last step, in the order of the motion: number (those of the scene: events, stops, impacts), t, q[n], p[n];
-    // of an impact the state after it.
+    Status velocity(real* v) const {
+        real p[n];
+        stepper.momentum(p);
+        return stepper.velocity(time(), q(), p, v);
+    }
+    Status energy(real* H) const {  // of a kernel that has it: K::has_energy
+        real p[n];
+        stepper.momentum(p);
+        return stepper.energy(time(), q(), p, H);
+    }
+    // Of the last step, in the order of the motion: number (from 0: events, stops, impacts of the scene; files count
+    // them from 1), t, q[n], p[n]; of an impact the state after it.
     std::int64_t events() const { return looks == nullptr ? 0 : looks->count; }
     const real* event(std::int64_t i) const { return looks->rows + i * columns; }
 

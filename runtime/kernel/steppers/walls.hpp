@@ -24,8 +24,8 @@ struct Walls {
     real time{}, q[n]{}, p[n]{}, velocity[n]{};
     real value[K::events]{};                  // of all that is watched
     real gradient[room * n]{}, rate[room]{};  // of impacts: dg/dq, and dg/dt at fixed q
-    real restitution[room]{};
-    real slack[count]{};    // g as small as this is zero
+    real restitution[room]{}, slow[room]{};   // slow: a speed; the motion that leaves a wall more slowly ends there
+    real slack[count]{};                      // g as small as this is zero
     real approach[room]{};  // dg/dt along the motion, where it is above rounding; below 0: towards the wall
 
     // Everything at (t, q, p) of a stepper.
@@ -58,6 +58,7 @@ struct Walls {
             if (is_behind(w)) return true;
         return false;
     }
+    bool comes_to_rest(int w) const { return fabs(approach[w]) < slow[w]; }
     bool is_met(int w) const { return fabs(value[first + w]) <= slack[w] && approach[w] < real(0); }
 
     // (D52) What wall w does to the momentum.
@@ -129,7 +130,7 @@ private:
     }
 
     void look_at_impacts(S& stepper) {
-        Formulas<K>::impact(stepper.coefficients, time, q, gradient, rate, restitution);
+        Formulas<K>::impact(stepper.coefficients, time, q, gradient, rate, restitution, slow);
         for (int w = 0; w < impacts; ++w) {
             const real step = fabs(stepper.step_size), passed = fabs(time) > step ? fabs(time) : step;
             real along = rate[w], speed = fabs(rate[w]), moved = speed * passed;

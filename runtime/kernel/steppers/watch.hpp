@@ -153,24 +153,33 @@ private:
         return K::prepare(stepper.parameters, stepper.step_size, stepper.coefficients);
     }
 
-    // All walls that are met there, one after another, until none is.
+    // All walls that are met there, one after another, until none is, or none faster than the motion comes to rest. It
+    // ends where it leaves the last of them too slowly, or lies there; where rows are asked for.
     Status meet(S& stepper, Walls<K>& wall, int first, real* rows, std::int64_t& count) {
-        for (bool is_first = true;; is_first = false) {
-            int met = is_first && K::reset_of[first] >= 0 ? first : -1;
+        for (int last = -1;;) {
+            int met = last < 0 && K::reset_of[first] >= 0 ? first : -1;
             for (int w = 0; w < impacts_of<K>() && met < 0; ++w)
-                if (wall.is_met(w) || (is_first && w == first && wall.approach[w] < real(0))) met = w;
-            if (met < 0) return is_first ? Status::impacts_accumulate : Status::ok;
+                if ((wall.is_met(w) && (last < 0 || !wall.comes_to_rest(w))) ||
+                    (last < 0 && w == first && wall.approach[w] < real(0)))
+                    met = w;
+            const bool lies = met < 0 && last < 0 && rows != nullptr && wall.comes_to_rest(first);
+            if (met < 0 && !lies) {
+                if (last < 0) return Status::impacts_accumulate;
+                return rows != nullptr && wall.comes_to_rest(last) ? Status::stopped : Status::ok;
+            }
             if (++impacts > most_impacts) return Status::impacts_accumulate;
-            const Status status = wall.hit(stepper, met);
+            last = lies ? first : met;
+            const Status status = lies ? Status::ok : wall.hit(stepper, last);
             if (status != Status::ok) return status;
             if (rows == nullptr) continue;
             real* const row = rows + count++ * columns;
-            row[0] = real(first_wall + met);
+            row[0] = real(first_wall + last);
             row[1] = wall.time;
             for (int k = 0; k < n; ++k) {
                 row[2 + k] = wall.q[k];
                 row[2 + n + k] = wall.p[k];
             }
+            if (lies) return Status::stopped;
         }
     }
 

@@ -4,8 +4,9 @@
 // K::events functions are watched: first events, then the K::stops, which end the motion, then walls (walls.hpp). The
 // motion stays on one side of a wall until it meets it; a value that is only rounding counts as zero. K::impacts walls
 // throw the motion back. The last K::switches walls change its formulas; their sides, 1 or -1, are the last parameters.
-// impact(k, q, G, g_t, e) gives dg/dq, dg/dt at fixed q and the restitution of each wall. Where reset_of[] of it is not
-// below 0, reset(k, q, velocity, q1, velocity1) gives the state after that one of the K::resets.
+// impact(k, q, G, g_t, e, rest) gives dg/dq, dg/dt at fixed q and the restitution of each wall, and the speed below
+// which the motion comes to rest there and ends. Where reset_of[] of it is not below 0, reset(k, q, velocity, q1,
+// velocity1) gives the state after that one of the K::resets.
 #ifndef LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 #define LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 

@@ -90,5 +90,6 @@ TEST_CASE("bodies have columns of their orientation and angular velocity" * doct
     CHECK(table_of_run(top + "[output]\nbodies = false\n").table.columns.size() == 1 + 14 + 1);
     CHECK(table_of_run("lagrangian = \"-arm.y\"\n[bodies]\narm = { mass = 1, inertia = 1 }\n[joints]\nswing = { type = "
                        "\"hinge\", bodies = [\"ground\", \"arm\"], point = [0, 1] }\n[run]\nstep = 0.01\nuntil = 1\n")
-              .table.columns == Columns{"t", "swing_angle", "p_swing_angle", "arm_angle", "arm_omega", "H"});
+              .table.columns ==
+          Columns{"t", "swing_angle", "p_swing_angle", "arm_x", "arm_y", "arm_angle", "arm_omega", "H"});
 }

@@ -54,7 +54,7 @@ TEST_CASE("a start at a singularity is refused with the term, the place and the 
           "or mend the formula");
     CHECK(refusal("x'^2/2 - x^2", at_origin, "", "x = \"-sqrt(x')\"\n") ==
           "scene.toml:6:5: the force on x has no derivative in x' at the start, x' = 0: division by zero; start "
-          "elsewhere, or mend the formula");
+          "elsewhere, or mend the formula: for sqrt(u) write sqrt(u + 1e-20)");
     CHECK(refusal("x'^2/2 - sqrt(x)", "x = { position = 1e-30, velocity = 0 }\n") == "accepted");
 }
 

@@ -139,12 +139,12 @@ TEST_CASE("the orientation that is shown is the rotation of the body, on all joi
     for (const Coordinate& coordinate : scene.coordinates) symbols.push_back(coordinate.position);
     const GiNaC::exmap values = arbitrary(symbols);
     const std::vector<Column>& columns = scene.outputs.columns;
-    REQUIRE(columns.size() == 4 * 7);
+    REQUIRE(columns.size() == 7 + 3 * 10);  // those on joints: their places first
     for (std::size_t b = 0; b < 4; ++b) {
         Quaternion q;
         ex square = 0;
         for (std::size_t k = 0; k < 4; ++k) {
-            q[k] = number(columns[7 * b + k].value, values);
+            q[k] = number(columns[10 * b + k].value, values);
             square += q[k] * q[k];
         }
         CHECK(std::fabs(number(square, values) - 1) < 1e-14);
@@ -306,6 +306,10 @@ TEST_CASE("mistakes in a joint are one clear error") {
     CHECK(of_joint("a = { type = \"hinge\", bodies = [\"ground\", \"arm\"], point = [0, 0] }\n"
                    "b = { type = \"hinge\", bodies = [\"ground\", \"arm\"], point = [2, 0], angle = 1 }") ==
           "top.toml:6:67: joint b closes a loop, so that the other joints tell its start; leave out angle");
+    CHECK(
+        of_joint(
+            "a = { type = \"hinge\", bodies = [\"ground\", \"arm\"], point = [0, 0], constraint = true, angle = 1 }") ==
+        "top.toml:5:86: joint a is a constraint, so that its bodies tell its start in [bodies]; leave out angle");
     CHECK(refusal("[joints]\na = { type = \"ball\" }\n[coordinates]\nx = { position = 0, velocity = 0 }\n") ==
           "top.toml:1:2: joints hold bodies together; add [bodies] with lines such as top = { mass = 1, inertia = "
           "[1, 1, 0.5], position = [0, 0, 1] }");

@@ -266,7 +266,8 @@ TEST_CASE("values of the wrong type are named") {
     check_error(3, "q = 1", {3, 5}, "q must be a table such as q = { position = 1, velocity = 0 }, not a whole number");
     check_error(5, "m = true", {5, 5}, "m must be a number or a formula in quotes, not true or false");
     check_error(5, "m = { value = 1, constant = 1 }", {5, 29}, "constant must be true or false, not a whole number");
-    check_error(9, "until = 1\n[output]\nevery = 1.5", {11, 9}, "every must be a whole number, not a number");
+    check_error(9, "until = 1\n[output]\nevery = 1.5", {11, 9},
+                "every must be a whole number, written without a point, not 1.5");
     check_error(9, "until = 1\n[output]\nevery = 0", {11, 9},
                 "every is 0; at least 1 and at most 9e15: states whose step is a multiple of it are kept");
     check_error(9, "until = 1\n[method]\npoints = 13", {11, 10}, "points is 13; there is Lobatto with 2 to 12 points");

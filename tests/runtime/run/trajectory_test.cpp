@@ -270,7 +270,8 @@ TEST_CASE("each way to stop has its own explanation") {
     CHECK(explain_stop(result, request) ==
           where +
               "the equations for the positions inside the step have no unique solution: their Jacobian is singular. "
-              "This h meets a resonance of the forces there, or constraints depend on one another, as at a dead point. "
+              "This h meets a resonance of the forces there, a body turns by a large part of a revolution in it, or "
+              "constraints depend on one another, as at a dead point. "
               "Try a smaller step, such as h = 0.25, or a slightly different one.");
     result.status = LOBATTO_TIME_STANDS_STILL;
     CHECK(explain_stop(result, request) ==
