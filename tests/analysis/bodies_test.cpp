@@ -184,7 +184,7 @@ TEST_CASE("a distance is a rod, and two hinges and one more close a loop") {
     CHECK(std::fabs(loop[1] + one[0]) < 1e-12);
 }
 
-TEST_CASE("a joint that is a constraint moves its bodies as one that they hang on") {
+TEST_CASE("a joint that is a constraint moves its bodies as one that they hang on" * doctest::test_suite("slow")) {
     const std::string bodies =
         "lagrangian = \"-2*top.z - arm.z\"\n[bodies]\n"
         "top = { mass = 2, inertia = [0.3, 0.4, 0.2], position = [0, 0, 1], velocity = [0.3, 0, 1], angular_velocity = "
