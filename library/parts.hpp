@@ -33,6 +33,7 @@ struct Required {
     std::string complaint;
 };
 std::vector<Required> required_of(const lobatto::Scene& scene);
+inline constexpr double least_parameter = 1e-300;  // in size, other than 0
 // InputError where one of the `count` parameters from `first` on, which have changed, is no number, or where all of
 // them together are no values that the scene allows.
 void check_change(const std::vector<Required>& required, const std::vector<double>& parameters, std::size_t first,

@@ -533,6 +533,31 @@ TEST_CASE(
     }
 }
 
+TEST_CASE("steps with constraints or a clock have derivatives by parameters, where they have none by their start") {
+    for (const std::string text :
+         {"lagrangian = \"(x'^2 + y'^2)/2 - k*y\"\n[constraints]\nrod = \"x^2 + y^2 = 1\"\n[parameters]\nk = 9.81\n"
+          "[coordinates]\nx = { position = 0.6, velocity = 0 }\ny = { position = -0.8, velocity = 0 }\n[run]\nstep = "
+          "0.05\nuntil = 1\n",
+          "lagrangian = \"(x'^2 + y'^2)/2 + k/sqrt(x^2 + y^2)\"\n[parameters]\nk = 1\n[coordinates]\nx = { position = "
+          "1, "
+          "velocity = 0 }\ny = { position = 0, velocity = 1.1 }\n[method]\npoints = 7\nclock = \"auto\"\n[run]\nstep = "
+          "0.1\nuntil = 2\n"}) {
+        lob::Stepper stepper = stepper_of(text);
+        const double k = stepper.parameter("k"), d = 1e-4 * k;
+        const std::vector<double> derivative = stepper.sensitivity("k");
+        lob::Stepper above = stepper, below = stepper;
+        above.set("k", k + d);
+        below.set("k", k - d);
+        above.step();
+        below.step();
+        for (std::size_t c = 0; c < 2; ++c) {
+            CHECK(std::fabs((above.q()[c] - below.q()[c]) / (2 * d) - derivative[c]) < 1e-8);
+            CHECK(std::fabs((above.p()[c] - below.p()[c]) / (2 * d) - derivative[2 + c]) < 1e-8);
+        }
+        CHECK_THROWS_AS(static_cast<void>(stepper.tangent()), lob::InputError);
+    }
+}
+
 TEST_CASE("where a step has no derivative by an input, that is said") {
     const auto complaint = [](const std::string& more, double u) {
         lob::Stepper stepper = stepper_of(scene_of("q'^2/2 + u*q", more));
