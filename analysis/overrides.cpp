@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "analysis/initial_value.hpp"
 #include "generator/formula/expression.hpp"
 #include "generator/formula/text/suggest.hpp"
 
@@ -25,18 +26,15 @@ constexpr double most_every = 9e15;  // the steps that a run can have
                     "'{}' is declared constant in {}, so it is part of the kernel; only run-time parameters can be set",
                     name, scene.path));
     }
-    for (const Coordinate& coordinate : scene.coordinates)
-        if (coordinate.written == name || coordinate.name == name)
-            source.fail({1, 1}, fmt::format("'{0}' is a coordinate, whose start stands in {1}; `lobatto sweep --vary "
-                                            "{0}=0.1` starts elsewhere",
-                                            name, scene.path));
     std::vector<std::string> names;
     for (const Parameter& parameter : scene.parameters)
         if (!parameter.is_side) names.push_back(parameter.written);
-    if (names.empty())
-        source.fail({1, 1}, fmt::format("unknown parameter '{}'; {} has no run-time parameters", name, scene.path));
-    source.fail({1, 1},
-                fmt::format("unknown parameter '{}'; declared: {}.{}", name, listing(names), suggestion(name, names)));
+    const std::vector<std::string> initial = initial_names(scene);
+    const std::string declared =
+        names.empty() ? scene.path + " has no run-time parameters" : "declared: " + listing(names);
+    names.insert(names.end(), initial.begin(), initial.end());
+    source.fail({1, 1}, fmt::format("unknown parameter '{}'; {}; of the start: {}.{}", name, declared, listing(initial),
+                                    suggestion(name, names)));
 }
 
 // Before the equals sign, without blanks beside it: of "m = 2" it is m.
@@ -46,7 +44,22 @@ std::string name_in(const std::string& argument) {
     return begin == std::string::npos ? "" : name.substr(begin, end + 1 - begin);
 }
 
-void set_parameter(const std::string& argument, Scene& scene) {
+GiNaC::ex in_parameters(const std::string& option, const std::string& argument, const std::string& what,
+                        const Scene& scene, std::size_t begin = 0) {
+    Names names = parameter_names(scene);
+    const Scope scope{&names, what, false, {}};
+    GiNaC::exmap values;
+    for (const Parameter& parameter : scene.parameters)  // whose own values may be formulas, as 2*pi
+        values[parameter.symbol] = scene.evaluate(parameter.value, "the parameter " + parameter.name);
+    const Source source(option, argument);
+    const Text text = text_of(argument, begin);
+    const GiNaC::ex expression = parse_expression(source, text, scope);
+    value_in_range(source, text.at.front(), expression, what, values);
+    return expression;
+}
+
+// Whether the name is one of a parameter.
+bool sets_parameter(const std::string& argument, Scene& scene) {
     const Source source("--set", argument);
     const std::size_t equals = argument.find('=');
     if (equals == std::string::npos) source.fail({1, 1}, "expected name=value, such as --set m=2");
@@ -54,24 +67,23 @@ void set_parameter(const std::string& argument, Scene& scene) {
     const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(), [&](const Parameter& p) {
         return !p.is_side && (p.written == name || p.name == name);
     });
-    if (parameter == scene.parameters.end()) fail_unknown(source, scene, name);
+    if (parameter == scene.parameters.end()) return false;
     const Scope scope{nullptr, fmt::format("the value of {}", name), false, {}};
     const Text text = text_of(argument, equals + 1);
     parameter->value = parse_expression(source, text, scope);
     value_in_range(source, text.at.front(), parameter->value, scope.formula);
+    return true;
 }
 
-GiNaC::ex in_parameters(const std::string& option, const std::string& argument, const std::string& what,
-                        const Scene& scene) {
-    Names names = parameter_names(scene);
-    const Scope scope{&names, what, false, {}};
-    GiNaC::exmap values;
-    for (const Parameter& parameter : scene.parameters)  // whose own values may be formulas, as 2*pi
-        values[parameter.symbol] = scene.evaluate(parameter.value, "the parameter " + parameter.name);
-    const Source source(option, argument);
-    const GiNaC::ex expression = parse_expression(source, text_of(argument, 0), scope);
-    value_in_range(source, {1, 1}, expression, what, values);
-    return expression;
+void set_initial_value(const std::string& argument, Scene& scene) {
+    const Source source("--set", argument);
+    const std::string name = name_in(argument);
+    const auto found = initial_value(scene, name, "set", [&](const std::string& message) {
+        source.fail({1, 1}, message);
+    });
+    if (!found) fail_unknown(source, scene, name);
+    (found->is_rate ? scene.initial_rate : scene.initial_position)[found->index] =
+        in_parameters("--set", argument, "the initial value " + name, scene, argument.find('=') + 1);
 }
 
 void keep_every(double every, Scene& scene) {
@@ -111,12 +123,14 @@ Text text_of(const std::string& argument, std::size_t begin, std::size_t end) {
 
 void apply(const Overrides& overrides, Scene& scene) {
     std::set<std::string> names;
+    std::vector<std::string> of_start;  // may hold parameters, whose values are set first
     for (const std::string& argument : overrides.set) {
         const std::string name = name_in(argument);
         if (!names.insert(name).second)
             throw InputError(fmt::format("--set: '{}' is set twice; leave one of both out", name));
-        set_parameter(argument, scene);
+        if (!sets_parameter(argument, scene)) of_start.push_back(argument);
     }
+    for (const std::string& argument : of_start) set_initial_value(argument, scene);
     if (!overrides.step.empty()) scene.run.step = in_parameters("--step", overrides.step, "the step", scene);
     if (!overrides.until.empty()) scene.run.until = in_parameters("--until", overrides.until, "the end time", scene);
     if (overrides.every) keep_every(*overrides.every, scene);

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/initial_value.hpp"
 #include "analysis/overrides.hpp"
 #include "generator/formula/expression.hpp"
 #include "generator/formula/text/suggest.hpp"
@@ -22,12 +23,6 @@ constexpr long most_values = 10'000'000;  // of a name: those that were asked fo
 
 std::size_t place_of(std::int64_t index) {
     return static_cast<std::size_t>(index);
-}
-
-// The rate that a scene gives: q' or p_q, as it is written and by its plain name.
-std::vector<std::string> rate_names(const Scene& scene, const Coordinate& coordinate) {
-    if (scene.start == Start::velocity) return {coordinate.written + "'", coordinate.name + "'"};
-    return {"p_" + coordinate.name};
 }
 
 class AxisReader {
@@ -160,27 +155,9 @@ VariedName varied_name(const Scene& scene, const std::string& name, const std::s
         names.push_back(scene.parameters[i].written);
         if (name == names.back() || name == scene.parameters[i].name) return {Role::parameter, i, name};
     }
-    for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
-        const Coordinate& coordinate = scene.coordinates[k];
-        if (scene.has_time_coordinate() && k + 1 == scene.coordinates.size()) {
-            if (name == coordinate.name || name == coordinate.name + "'" || name == "p_" + coordinate.name)
-                fail(fmt::format("{} is of the time, which a clock counts from 0; it cannot be varied", name));
-            continue;
-        }
-        names.push_back(coordinate.written);
-        if (name == names.back() || name == coordinate.name) return {Role::position, k, name};
-        const std::vector<std::string> rates = rate_names(scene, coordinate);
-        names.push_back(rates.front());
-        if (std::find(rates.begin(), rates.end(), name) != rates.end()) return {Role::rate, k, name};
-        const bool velocity = name == coordinate.written + "'" || name == coordinate.name + "'";
-        if (velocity || name == "p_" + coordinate.name)
-            fail(fmt::format("{} gives initial {}, not {}; vary {} instead", scene.path,
-                             velocity ? "momenta" : "velocities", velocity ? "velocities" : "momenta", names.back()));
-    }
-    for (const Eliminated& x : scene.eliminated)
-        for (const std::string& one : {x.coordinate.written, x.coordinate.name})
-            if (name == one || name == one + "'")
-                fail(fmt::format("{} is eliminated and follows from others ({}); vary those", one, x.constraint.text));
+    if (const auto found = initial_value(scene, name, "vary", fail))
+        return {found->is_rate ? Role::rate : Role::position, found->index, name};
+    for (const std::string& initial : initial_names(scene)) names.push_back(initial);
     static const std::pair<const char*, Role> settings[] = {{"step", Role::step},
                                                             {"points", Role::points},
                                                             {"stages", Role::stages},

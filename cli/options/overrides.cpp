@@ -6,7 +6,11 @@
 namespace lobatto {
 
 void add_set_option(Command& command, Overrides& overrides) {
-    command.option("--set", overrides.set, "Value of a parameter, NAME=VALUE, as in m=2 or omega=2*pi; may be repeated")
+    command
+        .option(
+            "--set", overrides.set,
+            "Value of a parameter, or of the start, NAME=VALUE, as in m=2, omega=2*pi, q=0.5, q'=1 or p_q=1; may be "
+            "repeated")
         .shown_as("NAME=VALUE")
         .one_value_each();
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "generator/describe/writer.hpp"
 #include "generator/graph/notation.hpp"
@@ -107,9 +108,63 @@ void Describer::straight_path() {
     vector("drifts", "D40", "", "and of the drifts, c_i+1 - c_i", numbered("a", s_ - 1), drifts);
 }
 
+namespace {
+
+// Written out or with its brackets, whichever is shorter.
+GiNaC::ex shorter(const GiNaC::ex& expression) {
+    const GiNaC::ex expanded = expression.expand();
+    return canonical_text(expanded).size() < canonical_text(expression).size() ? expanded : expression;
+}
+
+// (D26) The energy of a term of L: d - 1 times itself, if it is of degree d in the velocities.
+std::optional<GiNaC::ex> energy_by_degree(const GiNaC::ex& term, const GiNaC::ex& radial) {
+    for (int degree = 0; degree <= 4; ++degree)
+        if ((radial - degree * term).expand().is_zero()) return (degree - 1) * term;
+    return std::nullopt;
+}
+
+// (D26) v . dL/dv - L, term by term, so that no kinetic energy is subtracted from its double where that can be seen.
+GiNaC::ex energy_of(const System& system) {
+    GiNaC::ex energy = 0;
+    for (const GiNaC::ex& term : system.terms)
+        for (const GiNaC::ex& part : terms_of(term.expand(), system.v)) {
+            const std::vector<GiNaC::ex> slopes = gradient_of({part}, system.v);
+            GiNaC::ex radial = 0;
+            for (std::size_t k = 0; k < slopes.size(); ++k) radial += system.v[k] * slopes[k];
+            energy += energy_by_degree(part, radial).value_or(radial - part);
+        }
+    return shorter(energy);
+}
+
+}  // namespace
+
+// (D25, D44) d/dt dL/dv - dL/dq - F, and what constraints add. With a clock L is that of the clock's time.
+void Describer::equations_of_motion() {
+    if (d_.scene.clock) return;
+    const System& system = d_.system;
+    std::vector<GiNaC::ex> inertia(n_), rest;
+    for (const GiNaC::ex& force : system.force) rest.push_back(-force);
+    for (const auto& [place, value] : system.momentum_v.entries()) {
+        const auto k = static_cast<std::size_t>(place.first), j = static_cast<std::size_t>(place.second);
+        inertia[k] += value * acceleration_symbol(j);
+    }
+    for (const auto& [place, value] : system.momentum_q.entries())
+        rest[static_cast<std::size_t>(place.first)] += value * system.v[static_cast<std::size_t>(place.second)];
+    const SparseMatrix by_time = derivative_of(system.momentum, {system.t});
+    for (const auto& [place, value] : by_time.entries()) rest[static_cast<std::size_t>(place.first)] += value;
+    for (const auto& [place, value] : system.constraint_q.entries())
+        rest[static_cast<std::size_t>(place.second)] -=
+            value * multiplier_symbol(static_cast<std::size_t>(place.first));
+    for (std::size_t k = 0; k < n_; ++k) inertia[k] += shorter(rest[k]);
+    const std::string of_constraints = system.constraints.empty() ? "" : ", with the multipliers of the constraints";
+    vector("equations_of_motion", system.constraints.empty() ? "D25" : "D44", "",
+           "equations of motion (Euler-Lagrange)" + of_constraints, Names(n_, "0"), inertia);
+}
+
 void Describer::separable_system() {
     const System& system = d_.system;
     section("The system");
+    equations_of_motion();
     matrix("mass", "D2", "mass matrix", "M", system.mass);
     scalar("potential", "D3", "", "potential energy", "V", system.potential);
     SparseMatrix inverse(system.n, system.n), S(system.n, system.n);
@@ -152,6 +207,7 @@ void Describer::separable_system() {
 void Describer::general_system() {
     const System& system = d_.system;
     section("The system");
+    equations_of_motion();
     vector("momentum", "D25", "", "momentum, dL/dq'", by_coordinate("p"), system.momentum);
     const bool forced = system.has_forces();
     vector("force", "D25", "", forced ? "force, dL/dq + F" : "force, dL/dq", by_coordinate("f"), system.force);
@@ -160,9 +216,7 @@ void Describer::general_system() {
     second_derivatives("momentum_by_position", "and by the positions", "dp/dq", system.momentum_q);
     second_derivatives("force_by_velocity", "derivatives of the forces by the velocities v", "df/dv", system.force_v);
     second_derivatives("force_by_position", "and by the positions", "df/dq", system.force_q);
-    GiNaC::ex energy = -system.lagrangian;
-    for (std::size_t k = 0; k < n_; ++k) energy += system.momentum[k] * system.v[k];
-    scalar("energy", "D26", "", "energy, p.q' - L", "H", energy);
+    scalar("energy", "D26", "", "energy, p.q' - L", "H", energy_of(system));
 }
 
 // (D44)

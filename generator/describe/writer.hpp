@@ -93,13 +93,16 @@ protected:
         result_.sections.back().formulas.push_back(std::move(formula));
     }
 
-    GiNaC::symbol momentum_symbol(std::size_t k) {
-        while (p_.size() <= k) {
-            p_.emplace_back("p");
-            std::string wish = by_coordinate("p")[p_.size() - 1];
-            rename(p_.back(), wish);
-        }
-        return p_[k];
+    GiNaC::symbol momentum_symbol(std::size_t k) { return symbol_among(p_, k, by_coordinate("p")[k]); }
+    GiNaC::symbol acceleration_symbol(std::size_t k) { return symbol_among(accelerations_, k, name(k) + "''"); }
+    GiNaC::symbol multiplier_symbol(std::size_t c) {
+        return symbol_among(multipliers_, c, "lambda_" + d_.system.constraints[c].name);
+    }
+    using Symbols = std::map<std::size_t, GiNaC::symbol>;
+    GiNaC::symbol symbol_among(Symbols& symbols, std::size_t k, const std::string& wish) {
+        const auto [place, is_new] = symbols.try_emplace(k);
+        if (is_new) rename(place->second, wish);
+        return place->second;
     }
 
     const Derivation& d_;
@@ -108,7 +111,7 @@ protected:
     std::set<std::string> taken_;
     GiNaC::exmap display_;
     std::map<GiNaC::ex, std::string, GiNaC::ex_is_less> names_;
-    std::vector<GiNaC::symbol> p_;
+    Symbols p_, accelerations_, multipliers_;
     Description result_;
 };
 
@@ -125,6 +128,8 @@ private:
     void quadrature();
     // As decimals, which the coefficients are.
     void straight_path();
+    // (D25, D44) d/dt dL/dv - dL/dq - F, and what constraints add.
+    void equations_of_motion();
     void separable_system();
     void general_system();
     // (D44)

@@ -11,6 +11,19 @@
 
 namespace lobatto {
 
+namespace {
+
+// x' and x'' have a dot or two on their x.
+std::string with_dots(const std::string& stem, std::size_t primes) {
+    return primes == 0 ? stem : (primes == 1 ? "\\dot{" : "\\ddot{") + stem + "}";
+}
+
+std::size_t primes_of(const std::string& name) {
+    return name.size() - (name.find_last_not_of('\'') + 1);
+}
+
+}  // namespace
+
 std::string latex_name(const std::string& name) {
     static const std::map<std::string, std::string> greek = [] {
         std::map<std::string, std::string> names;
@@ -25,8 +38,8 @@ std::string latex_name(const std::string& name) {
     if (const auto by = name.find("/d"); name.starts_with("d") && by != std::string::npos)  // dp/dq
         return "\\partial " + latex_name(name.substr(1, by - 1)) + "/\\partial " + latex_name(name.substr(by + 2));
     std::string stem = name, subscript;
-    const bool velocity = !stem.empty() && stem.back() == '\'';
-    if (velocity) stem.pop_back();
+    const std::size_t primes = primes_of(stem);
+    stem.resize(stem.size() - primes);
     if (const auto underscore = stem.find('_'); underscore != std::string::npos && underscore > 0) {
         subscript = stem.substr(underscore + 1);
         stem.erase(underscore);
@@ -39,7 +52,7 @@ std::string latex_name(const std::string& name) {
         stem = letter->second;
     else if (stem.size() > 1)
         stem = "\\mathrm{" + stem + "}";
-    if (velocity) stem = "\\dot{" + stem + "}";
+    stem = with_dots(stem, primes);
     // Subscripts of subscripts stand side by side: p_theta_left becomes p_{\theta,\mathrm{left}}.
     std::string below;
     for (std::size_t begin = 0; begin < subscript.size();) {
@@ -72,8 +85,7 @@ std::map<std::string, std::string> latex_as_written(const std::set<std::string>&
             std::string letters;
             for (const char c : name)
                 if (c != '\'') letters += c == '_' ? std::string("\\_") : std::string(1, c);
-            const std::string upright = "\\mathrm{" + letters + "}";
-            written[name] = name.back() == '\'' ? "\\dot{" + upright + "}" : upright;
+            written[name] = with_dots("\\mathrm{" + letters + "}", primes_of(name));
         }
     }
     return written;

@@ -8,7 +8,7 @@
 
 Units are those of the scene. The first call with a new Lagrangian compiles its kernel (g++, about a second); later
 ones find it in a cache. Settings have the names of the command line: points, stages, splitting, tolerance, arithmetic,
-numbers, clock, step, until, every, set={parameter: value}.
+numbers, clock, step, until, every, set={name: value} of parameters and of the start (q, q' or p_q).
 """
 
 from ._lobatto import (ComputationError, Error, InputError, MachineError, RunFailure, Scene, Stepper, Variable,

@@ -84,8 +84,10 @@ TEST_CASE("keys, options and quotes in the wrong place are told the right one") 
     CHECK(test::contains(told(oscillator(good, "step = 0.1", "[method]\nsplitting = 11\n")),
                          "Write family = \"splitting\", and this number as stages."));
     CHECK(test::contains(told(oscillator(good, "step = 0.1\nstop = \"x < 0\"")), "an event is written a = b falling"));
-    CHECK(test::contains(told(oscillator(good, "step = 0.1"), 2, {"--set", "x=2"}),
-                         "'x' is a coordinate, whose start stands in"));
+    CHECK(test::contains(told(oscillator(good, "step = 0.1"), 2, {"--set", "p_x=2"}),
+                         "gives initial velocities, not momenta; set x' instead"));
+    CHECK(test::contains(told(oscillator(good, "step = 0.1"), 2, {"--set", "xx=2"}),
+                         "has no run-time parameters; of the start: x, x'."));
     CHECK(test::contains(told(oscillator(good, "step = 0.1"), 2, {"--vary", "x=2"}), "`lobatto sweep` has it"));
     CHECK(test::contains(told(oscillator(good, "step = 0.1", "[output]\nkeep = \"max(x) - min(x)\"\n")),
                          "what is kept of a trajectory is first(x = 0) or count(x = 0 rising) of an event"));

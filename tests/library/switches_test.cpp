@@ -207,6 +207,6 @@ TEST_CASE("the sides of switches are no parameters that others set") {
     CHECK_THROWS_WITH_AS(stepper.set("side_1", -1), "unknown parameter 'side_1'; declared: m.", lob::InputError);
     lob::Settings settings;
     settings.set = {{"side_1", "-1"}};
-    CHECK_THROWS_WITH_AS(lob::compile(scene, settings), doctest::Contains("unknown parameter 'side_1'; declared: m."),
-                         lob::InputError);
+    CHECK_THROWS_WITH_AS(lob::compile(scene, settings),
+                         doctest::Contains("unknown parameter 'side_1'; declared: m; of the start: "), lob::InputError);
 }

@@ -283,6 +283,8 @@ def test_a_sweep_takes_and_gives_arrays(pendulum):
     starts = numpy.linspace(0.1, 2, 50)
     sweep = lobatto.sweep(pendulum, {"q": starts, "omega": 6.0}, until=3)
     assert sweep.q.shape == (50, 1) and sweep.ok.all()
+    run = lobatto.run(pendulum, until=3, set={"omega": 6.0, "q": 0.25, "q'": "omega/10"})
+    assert run.q[0, 0] == 0.25 and run.p[0, 0] == pytest.approx(0.6, rel=1e-15)
     run = lobatto.run(pendulum, until=3, set={"omega": 6.0})
     close = lobatto.sweep(pendulum, {"q": [numpy.pi / 2], "omega": [6.0]}, until=3)
     assert close.q[0, 0] == pytest.approx(run.q[-1, 0], abs=1e-12)

@@ -176,6 +176,40 @@ TEST_CASE("the command line replaces values of the scene, with one kernel for al
     CHECK(test::read_trajectory(place.file()).comments[2] == "method: splitting, 14 stages, h = 0.05");
 }
 
+TEST_CASE("--set gives another start, as the scene would, with the same kernel and the values of other parameters") {
+    const Place place;
+    const auto last = [&](const std::string& scene, std::vector<std::string> options) {
+        options.insert(options.begin(), {place.file(scene), "-o", place.file()});
+        const test::Finished done = place.run(options);
+        INFO(done.err);
+        CHECK(done.exit_code == 0);
+        return test::read_trajectory(place.file()).rows.back();
+    };
+    const auto bead = [](const std::string& x, const std::string& rate, const std::string& more) {
+        return "lagrangian = \"(1 + x^2)*x'^2/2 + m*y'^2/2 - (x - y)^2/2 - k*y^4/4\"\n[coordinates]\nx = " + x +
+               "\ny = { position = 0, " + rate + " = 0 }\n[parameters]\nk = 2\nm = 1\n" + more +
+               "[run]\nstep = 0.05\nuntil = 5\n";
+    };
+    for (const std::string more : {"", "[method]\nclock = \"1/(1 + x^2)\"\n"}) {
+        test::write_text(place.file("a.toml"), bead("{ position = 1, velocity = 0 }", "velocity", more));
+        test::write_text(place.file("b.toml"), bead("{ position = 0.75, velocity = 1.5 }", "velocity", more));
+        // The formula of the start takes k from where it is set, on its right.
+        CHECK(last("a.toml", {"--set", "x = k/4", "--set", "x'=3/2", "--set", "k=3"}) ==
+              last("b.toml", {"--set", "k=3"}));
+    }
+    test::write_text(place.file("a.toml"), bead("{ position = 1, momentum = 0 }", "momentum", ""));
+    test::write_text(place.file("b.toml"), bead("{ position = 1, momentum = 0.5 }", "momentum", ""));
+    CHECK(last("a.toml", {"--set", "p_x=0.5"}) == last("b.toml", {}));
+    const test::Finished again = place.run({place.file("a.toml"), "--set", "p_x=0.25", "-o", place.file()});
+    CHECK(test::contains(again.out, "found derived and compiled in the cache"));
+    CHECK(test::contains(place.run({place.file("a.toml"), "--set", "x'=1", "-o", place.file()}).err,
+                         "gives initial momenta, not velocities; set p_x instead"));
+    // A start that keeps no constraint, and one without a mass.
+    const test::Finished off = place.run({LOBATTO_SOURCE_DIR "/scenes/rod_pendulum.toml", "--set", "x=0.5"});
+    CHECK(off.exit_code == 2);
+    CHECK(test::contains(off.err, "the start does not keep the constraint rod"));
+}
+
 TEST_CASE("an end that is no multiple of the step is said, not overrun") {
     const Place place;
     const test::Finished done = place.run({pendulum, "-o", place.file(), "--step", "0.3", "--until", "1"});
@@ -215,7 +249,8 @@ TEST_CASE("wrong values on the command line are refused with exit code 2") {
         return done.err;
     };
     CHECK(refusal({"--set", "omgea=2"}) ==
-          "--set:1:1: unknown parameter 'omgea'; declared: m, omega. Did you mean 'omega'?\n  1 | omgea=2\n   "
+          "--set:1:1: unknown parameter 'omgea'; declared: m, omega; of the start: q, q'. Did you mean 'omega'?\n  1 | "
+          "omgea=2\n   "
           " | ^\n");
     CHECK(refusal({"--tolerance", ".5e-6"}) ==
           "lobatto: --tolerance: a number begins with a digit: write 0.5e-6, not .5e-6\n"
