@@ -10,6 +10,29 @@
 namespace lobatto {
 namespace {
 
+// What other languages have.
+std::string advice_for_function(const std::string& name, const std::vector<std::string>& names) {
+    static const std::map<std::string, const char*> others{{"ln", " Write log."},
+                                                           {"pow", " Write x^2."},
+                                                           {"sqr", " Write x^2."},
+                                                           {"fabs", " Write abs."},
+                                                           {"sgn", " Write sign."},
+                                                           {"arcsin", " Write asin."},
+                                                           {"arccos", " Write acos."},
+                                                           {"arctan", " Write atan."},
+                                                           {"arctan2", " Write atan2."},
+                                                           {"log10", " Write log(x)/log(10)."},
+                                                           {"diff", " The velocity of x is written x'."},
+                                                           {"Derivative", " The velocity of x is written x'."},
+                                                           {"where", " Write if(condition, then, otherwise)."},
+                                                           {"heaviside", " Write if(x > 0, 1, 0)."}};
+    const std::string last = name.substr(name.find_last_of('.') + 1);  // np.cos
+    if (const auto found = others.find(last); found != others.end()) return found->second;
+    if (last != name && std::find(names.begin(), names.end(), last) != names.end())
+        return fmt::format(" Write {}.", last);
+    return suggestion(name, names);
+}
+
 std::string kind_of(const Name& name) {
     switch (name.role) {
         case Name::Role::coordinate:
@@ -155,7 +178,7 @@ void Parser::refuse_by_role(const Syntax& formula, std::string_view base) const 
         for (const Function& function : functions()) names.push_back(function.name);
         names.insert(names.end(), {"sum", "mod", "table"});
         for (const auto& [pieced, form] : pieced_functions()) names.push_back(pieced);
-        const std::string near = name == "ln" ? " Write log." : suggestion(name, names);
+        const std::string near = advice_for_function(name, names);
         fail(at, fmt::format("unknown function '{}' in {}; there are {}.{}", shown, scope_.formula,
                              fmt::join(names, ", "), near));
     }

@@ -37,6 +37,25 @@ TEST_CASE("what other programs call otherwise is told by our name") {
     CHECK(test::contains(told(oscillator("x'^2/2 - x^2/2", "step = 0.1\nstart = 5")), "A run begins at t = 0"));
 }
 
+TEST_CASE("sections, functions and signs of other languages are told ours") {
+    const auto function = [](const std::string& formula) {
+        return told(oscillator("x'^2/2 - " + formula, "step = 0.1"));
+    };
+    CHECK(test::contains(function("np.cos(x)"), "Write cos."));
+    CHECK(test::contains(function("math.pow(x, 2)"), "Write x^2."));
+    CHECK(test::contains(function("arctan(x)"), "Write atan."));
+    CHECK(test::contains(function("diff(x, t)"), "The velocity of x is written x'."));
+    CHECK(test::contains(function("|x|"), "unexpected character '|' in the Lagrangian: write abs(...)"));
+    CHECK(test::contains(function("\\\\frac{1}{2}*x"), "formulas are no LaTeX"));
+    const auto scene = [](const std::string& section) {
+        return told(oscillator("x'^2/2 - x^2/2", "step = 0.1", section + "\nk = 1\n"));
+    };
+    CHECK(test::contains(scene("[params]"), "It is called parameters."));
+    CHECK(test::contains(scene("[initial]"), "The start stands under [coordinates]"));
+    CHECK(test::contains(told("hamiltonian = \"p^2/2\"\n"), "for H = p^2/(2*m) + V write \"m*x'^2/2 - V\""));
+    CHECK(test::contains(told("kinetic = \"x'^2/2\"\n"), "Write lagrangian = \"kinetic energy - potential energy\"."));
+}
+
 TEST_CASE("slips of a blackboard are told how they are written") {
     CHECK(test::contains(told(oscillator("v^2/2 - x^2/2", "step = 0.1")), "The velocity of x is written x'."));
     CHECK(test::contains(told(oscillator("x'^2/2 - e^x", "step = 0.1")), "Write exp(...)."));

@@ -41,6 +41,8 @@ constexpr Mend mends[] = {{"−–—", "write - instead"},
                           {"αβγδεζηθικλμνξρστυφχψωΓΔΘΛΞΠΣΦΨΩ", "write the name of the letter, such as alpha"},
                           {"{", "write ( instead"},
                           {"}", "write ) instead"},
+                          {"|", "write abs(...)"},
+                          {"\\", "formulas are no LaTeX: write (a)/(b), sqrt(x), alpha"},
                           {"_", "a name begins with a letter"},
                           {"\u00A0", "this is a no-break space: type a plain one"}};
 

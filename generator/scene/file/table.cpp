@@ -21,7 +21,7 @@ std::string section_of(const std::string& key) {
     return "";
 }
 
-// What people of other programs call a key of [run], and keys that stand in the wrong section.
+// What people of other programs call a section or a key of [run], and keys that stand in the wrong section.
 std::string advice_for(const std::string& key, const std::vector<std::string>& known, const std::string& table) {
     static const std::map<std::string, std::string> others{
         {"dt", "step"},     {"h", "step"},         {"timestep", "step"}, {"tend", "until"},
@@ -29,7 +29,20 @@ std::string advice_for(const std::string& key, const std::vector<std::string>& k
         {"time", "until"},  {"duration", "until"}, {"t_final", "until"}, {"T", "until"}};
     if (table == "[run]" && (key == "start" || key == "t0" || key == "begin" || key == "t_start"))
         return " A run begins at t = 0: write t + 5 for t in the formulas to begin at 5.";
-    if (table == "a scene" && (key == "L" || key == "Lagrangian")) return " Write lagrangian = \"...\".";
+    static const std::map<std::string, const char*> of_scene{
+        {"L", " Write lagrangian = \"...\"."},
+        {"Lagrangian", " Write lagrangian = \"...\"."},
+        {"kinetic", " Write lagrangian = \"kinetic energy - potential energy\"."},
+        {"potential", " Write lagrangian = \"kinetic energy - potential energy\"."},
+        {"hamiltonian", " A scene has a Lagrangian, in velocities: for H = p^2/(2*m) + V write \"m*x'^2/2 - V\"."},
+        {"params", " It is called parameters."},
+        {"constants", " Write a line m = { value = 1, constant = true } under [parameters]."},
+        {"initial", " The start stands under [coordinates]: x = { position = 1, velocity = 0 }."},
+        {"initial_conditions", " The start stands under [coordinates]: x = { position = 1, velocity = 0 }."},
+        {"start", " The start stands under [coordinates]: x = { position = 1, velocity = 0 }."},
+        {"variables", " It is called coordinates."},
+        {"simulation", " It is called run."}};
+    if (const auto found = of_scene.find(key); table == "a scene" && found != of_scene.end()) return found->second;
     if (table == "[method]" && key == "splitting") return " Write family = \"splitting\", and this number as stages.";
     if (const std::string section = section_of(key); table.starts_with('[') && !section.empty())
         return fmt::format(" It belongs into [{}].", section);
