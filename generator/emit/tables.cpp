@@ -225,8 +225,14 @@ std::string watched_shapes(const Scene& scene) {
     std::string text;
     const std::vector<Event> watched = scene.watched();
     line(text, fmt::format("int events = {}", watched.size()), "that are watched for");
-    std::vector<int> directions, reset_of;
+    std::vector<int> directions, reset_of, passage_of;
     for (const Event& event : watched) directions.push_back(event.direction);
+    for (std::size_t w = 0; w < scene.impacts.size(); ++w) {  // of passages, all crossings
+        int& direction = directions[scene.outputs.events.size() + scene.run.stops.size() + w];
+        const bool passes = scene.impacts[w].passes;
+        passage_of.push_back(!passes ? 0 : direction == 0 ? 2 : direction);
+        if (passes) direction = 0;
+    }
     text += integer_table("event_direction", directions);
     if (watched.empty()) return text;
     int resets = 0;
@@ -237,7 +243,10 @@ std::string watched_shapes(const Scene& scene) {
          "where formulas change; the last parameters are the sides");
     if (scene.impacts.empty()) return text;
     line(text, fmt::format("int resets = {}", resets), "walls with an outcome of their own");
-    return text + integer_table("reset_of", reset_of);
+    text += integer_table("reset_of", reset_of);
+    const auto passages = std::count_if(passage_of.begin(), passage_of.end(), [](int one) { return one != 0; });
+    line(text, fmt::format("int passages = {}", passages), "walls that let the motion pass");
+    return text + integer_table("passage_of", passage_of);
 }
 
 std::string shapes(const Derivation& d, Precision precision, const std::string& name) {

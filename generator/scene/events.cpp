@@ -66,7 +66,8 @@ void SystemReader::read_impact(const Entry& entry) {
     const Table table(source_, table_of(source_, entry, "{ when = \"y = 0 falling\", restitution = 1 }"), entry.at,
                       "impact " + name, keys_of_section("impacts"));
     const Entry& when = table.get("when", "for example when = \"y = 0 falling\"");
-    const Entry *restitution = table.find("restitution"), *rest = table.find("rest"), *reset = table.find("reset");
+    const Entry *restitution = table.find("restitution"), *rest = table.find("rest"), *reset = table.find("reset"),
+                *passes = table.find("passes");
     if (when.value.kind != Value::Kind::text)
         fail(when.value.at,
              fmt::format("when must be a text such as \"y = 0 falling\", not {}", when.value.kind_name()));
@@ -76,11 +77,6 @@ void SystemReader::read_impact(const Entry& entry) {
     Scope scope = scope_of("the impact " + name, true);
     if (index) scope.indices = {*index};
     const EventSyntax crossing = parse_crossing(source_, when.value.text, scope);
-    if (crossing.direction == 0)
-        fail(when.value.at,
-             fmt::format("from which side does the motion meet {}? add 'falling' where the left side minus the right "
-                         "is above 0 before, 'rising' where it is below",
-                         name));
     if (scene_.impacts.size() + static_cast<std::size_t>(count) > most_impacts)
         fail(entry.at, fmt::format("{} impacts up to here; at most {}",
                                    scene_.impacts.size() + static_cast<std::size_t>(count), most_impacts));
@@ -97,12 +93,7 @@ void SystemReader::read_impact(const Entry& entry) {
         if (value.velocities)
             fail(when.value.at,
                  fmt::format("the wall {} holds a velocity; a wall is where positions are", impact.written));
-        if (std::none_of(scene_.coordinates.begin(), scene_.coordinates.end(),
-                         [&](const Coordinate& c) { return value.expression.has(c.position); }))
-            fail(when.value.at,
-                 fmt::format("the wall {} holds no coordinate; for an impulse at a time, stop there and start "
-                             "anew from a program (docs/limits.md)",
-                             impact.written));
+        impact.passes = passes_through(impact, passes, reset);
         if (restitution != nullptr) {
             GiNaC::numeric e = 0;
             impact.restitution = read_formula(*restitution, scope_of("the restitution", false), &e);
@@ -125,6 +116,29 @@ void SystemReader::read_impact(const Entry& entry) {
         if (reset != nullptr) read_reset(*reset, impact, scope, indices);
         scene_.impacts.push_back(impact);
     }
+}
+
+// Whether the motion goes on beyond the wall: where the scene says so, and at a time.
+bool SystemReader::passes_through(const Impact& impact, const Entry* passes, const Entry* reset) const {
+    const GiNaC::ex& g = impact.when.value;
+    const std::string& name = impact.written;
+    const bool is_asked = passes != nullptr && boolean_of(source_, *passes);
+    const bool is_time = std::none_of(scene_.coordinates.begin(), scene_.coordinates.end(),
+                                      [&](const Coordinate& c) { return g.has(c.position); });
+    if (is_time && !g.has(scene_.time))
+        fail(impact.when.at, fmt::format("{} never happens: it holds neither a coordinate nor the time", name));
+    if (is_time && passes != nullptr && !is_asked)
+        fail(passes->at, fmt::format("{} holds no coordinate, so the motion always passes it", name));
+    if ((is_time || is_asked) && reset == nullptr)
+        fail(impact.when.at, fmt::format("the motion passes {0}: say what changes there, as in reset = {{ \"{1}'\" = "
+                                         "\"{1}' + 1\" }}",
+                                         name, scene_.coordinates.front().written));
+    if (!is_time && !is_asked && impact.when.direction == 0)
+        fail(impact.when.at,
+             fmt::format("from which side does the motion meet {}? add 'falling' where the left side minus the right "
+                         "is above 0 before, 'rising' where it is below",
+                         name));
+    return is_time || is_asked;
 }
 
 // reset = { "x'" = "-x'" }: positions and velocities after the impact; those not named stay.

@@ -142,7 +142,8 @@ struct Requirement {
 struct Impact {
     std::string name;            // an identifier; element 3 of an array touch is touch_3
     std::string written = name;  // in the scene: touch[3]
-    Event when = {};             // with a direction, free of velocities
+    Event when = {};             // free of velocities; with a direction, unless it passes: then 0 is both
+    bool passes = false;         // the motion goes on beyond it, after its reset
     GiNaC::ex restitution = 1;   // in parameters
     GiNaC::ex rest = 0;          // in parameters: the run ends where the motion leaves the wall more slowly; 0: never
     // n each, of the state after it in that before it; empty: the momentum jumps instead.

@@ -96,6 +96,7 @@ private:
     long count_of(const Entry& entry, const Entry* count, const ArrayName& array, const std::string& what);
     void read_impacts();
     void read_impact(const Entry& entry);
+    bool passes_through(const Impact& impact, const Entry* passes, const Entry* reset) const;
     void read_reset(const Entry& entry, Impact& impact, const Scope& scope, const std::vector<long>& indices);
     Event read_event(const Value& value, const std::string& key);
     void read_figure(const Entry& entry);

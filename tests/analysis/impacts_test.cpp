@@ -381,6 +381,113 @@ TEST_CASE("a reset is the state after the impact") {
     CHECK(ended.result.p[0] == 4);
 }
 
+TEST_CASE("after a reset formulas of pieces are those of where it leads: no wall is met that is not there") {
+    // A step down of the ground behind x = 0, and a foot that is set there: free fall from 0.4.
+    const Ended step =
+        run("lagrangian = \"(x'^2 + y'^2)/2 - 9.81*y\"\n[coordinates]\nx = { position = 0.5, velocity = 0 }\n"
+            "y = { position = 1, velocity = 0 }\n[impacts]\nground = { when = \"y = -max(x, 0) falling\", reset = { "
+            "\"x\" = \"-0.5\", \"y\" = \"y + 0.9\", \"y'\" = \"0\" } }\n" +
+            method("points = 4", 0.01, 0.9));
+    REQUIRE(step.events.size() == 2);
+    const double first = std::sqrt(3 / 9.81), second = first + std::sqrt(0.8 / 9.81);
+    CHECK(std::fabs(step.events[0][1] - first) < 1e-14);
+    CHECK(std::fabs(step.events[1][1] - second) < 1e-14);
+    CHECK(std::fabs(step.result.q[1] - (0.9 - 9.81 * (0.9 - second) * (0.9 - second) / 2)) < 1e-13);
+    // Another wall's reset, which leads to the other piece of this one.
+    const Ended other = run(
+        "lagrangian = \"(x'^2 + y'^2)/2\"\n[coordinates]\nx = { position = 0.5, velocity = 1 }\n"
+        "y = { position = 0.2, velocity = 0 }\n[impacts]\na = { when = \"x = 1 rising\", reset = { \"x\" = \"-1\" } }\n"
+        "b = { when = \"y + max(x, 0) = 0 falling\", restitution = 1 }\n" +
+        method("points = 4", 0.1, 1));
+    CHECK(other.events.size() == 1);
+    CHECK(std::fabs(other.result.q[0] + 0.5) < 1e-14);
+}
+
+namespace {
+
+std::string kicked_rotor(const std::string& when, double step, double until) {
+    return "lagrangian = \"q'^2/2\"\ntime = \"t\"\n[coordinates]\nq = { position = 1, velocity = 0.5 }\n[impacts]\n"
+           "kick = { when = \"" +
+           when + "\", reset = { \"q'\" = \"q' + 0.6*sin(q)\" } }\n" + method("points = 4", step, until);
+}
+
+}  // namespace
+
+TEST_CASE("kicks at times: the standard map, in steps that end at kicks and in others") {
+    for (const double step : {0.25, 0.3, 1.0, 1.7}) {
+        for (const std::string when : {"sin(2*pi*t) = 0 rising", "sin(pi*t) = 0"}) {
+            CAPTURE(step);
+            CAPTURE(when);
+            const Ended ended = run(kicked_rotor(when, step, 34));
+            REQUIRE(ended.result.status == LOBATTO_OK);
+            double q = 1, p = 0.5;
+            std::size_t kicks = 0;
+            for (; kicks < ended.events.size(); ++kicks) {
+                p += 0.6 * std::sin(q);
+                const std::vector<double>& row = ended.events[kicks];
+                CHECK(std::fabs(row[1] - static_cast<double>(kicks)) < 1e-13);
+                CHECK(std::fabs(row[2] - q) < 1e-11);
+                CHECK(std::fabs(row[3] - p) < 1e-11);
+                q += p;
+            }
+            // Of a kick at the very end the state before it is the last.
+            CHECK(kicks == static_cast<std::size_t>(std::ceil(ended.result.time - 1e-9)));
+        }
+    }
+    const Ended once = run(kicked_rotor("t = 5 rising", 0.3, 9.9));
+    REQUIRE(once.events.size() == 1);
+    CHECK(std::fabs(once.result.q[0] - (3.5 + (0.5 + 0.6 * std::sin(3.5)) * 4.9)) < 1e-13);
+    CHECK(run(kicked_rotor("t = 5 falling", 0.3, 9.9)).events.empty());
+}
+
+TEST_CASE("a motion passes where the scene says so, with a reset in the direction that is named") {
+    const auto oscillator = [](const std::string& gates, double step, double until) {
+        return run("lagrangian = \"x'^2/2 - x^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n[impacts]\n" +
+                   gates + method("points = 8", step, until));
+    };
+    for (const auto& [direction, crossings] : {std::pair{"", 13}, {" falling", 7}, {" rising", 6}}) {
+        const Ended ended = oscillator(fmt::format("gate = {{ when = \"x = 0{}\", passes = true, reset = {{ \"x'\" = "
+                                                   "\"0.9*x'\" }} }}\n",
+                                                   direction),
+                                       0.1, 40);
+        CHECK(ended.events.size() == static_cast<std::size_t>(crossings));
+        CHECK(std::fabs(ended.result.q[0] - std::pow(0.9, crossings) * std::cos(40)) < 1e-12);
+    }
+    // A reset that turns the motion back leaves it on its side.
+    const Ended mirrors =
+        run("lagrangian = \"x'^2/2\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n[impacts]\n"
+            "a = { when = \"x = 1\", passes = true, reset = { \"x'\" = \"-x'\" } }\n"
+            "b = { when = \"x = -1 falling\", restitution = 1 }\n" +
+            method("points = 3", 0.3, 40.2));
+    CHECK(mirrors.events.size() == 20);
+    CHECK(std::fabs(mirrors.result.q[0] - 0.2) < 1e-12);
+    // Two at one time, in the order of the scene.
+    const Ended both =
+        run("lagrangian = \"x'^2/2\"\ntime = \"t\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n[impacts]\n"
+            "a = { when = \"t = 1\", reset = { \"x'\" = \"x' + 1\" } }\nb = { when = \"t = 1\", reset = { \"x'\" = "
+            "\"3*x'\" } }\n" +
+            method("points = 3", 0.25, 3));
+    CHECK(both.events.size() == 2);
+    CHECK(std::fabs(both.result.q[0] - 13) < 1e-13);
+}
+
+TEST_CASE("steps that kicks cut have the order of the method" * doctest::test_suite("slow")) {
+    const auto end = [](const std::string& how, double step) {
+        return run("lagrangian = \"q'^2/2 + cos(q)\"\ntime = \"t\"\n[coordinates]\n"
+                   "q = { position = 1, velocity = 0 }\n[impacts]\n\"kick[i]\" = { when = \"t = 0.7*i\", count = 4, "
+                   "reset = { \"q'\" = \"q' + 0.3*cos(q)\" } }\n" +
+                   method(how, step, 3.2))
+            .result.q[0];
+    };
+    const double exact = end("points = 12", 0.05);
+    for (const auto& [how, order] :
+         {std::pair{"points = 3", 4.0}, {"points = 4", 6.0}, {"family = \"gauss\"\nstages = 2", 4.0}}) {
+        CAPTURE(how);
+        const double measured = std::log2(std::fabs(end(how, 0.4) - exact) / std::fabs(end(how, 0.05) - exact)) / 3;
+        CHECK(std::fabs(measured - order) < 0.5);
+    }
+}
+
 TEST_CASE("a stop ends the run at its time, and says which") {
     // The separatrix: sin(q/2) = tanh t.
     const std::string text = "lagrangian = \"q'^2/2 + cos(q)\"\n[coordinates]\nq = { position = 0, velocity = 2 }\n" +
@@ -527,7 +634,14 @@ TEST_CASE("what is wrong with a wall is said with its place") {
     const auto wall = [&](const std::string& line) { return refusal(head + "[impacts]\n" + line + "\n" + tail); };
     CHECK(test::contains(wall("a = { when = \"y = 0\" }"), "5:14: from which side does the motion meet a?"));
     CHECK(test::contains(wall("a = { when = \"y' = 0 falling\" }"), "the wall a holds a velocity"));
-    CHECK(test::contains(wall("a = { when = \"1 = 0 falling\" }"), "the wall a holds no coordinate"));
+    CHECK(test::contains(wall("a = { when = \"1 = 0 falling\" }"), "a never happens"));
+    CHECK(test::contains(wall("a = { when = \"y = 0.5\", passes = true }"),
+                         "the motion passes a: say what changes there"));
+    const std::string kick = "time = \"t\"\n" + head + "[impacts]\na = { when = \"t = 0.5\"";
+    CHECK(test::contains(refusal(kick + " }\n" + tail),
+                         "6:14: the motion passes a: say what changes there, as in reset"));
+    CHECK(test::contains(refusal(kick + ", passes = false, reset = { \"y'\" = \"1\" } }\n" + tail),
+                         "a holds no coordinate, so the motion always passes it"));
     CHECK(test::contains(wall("a = { when = \"y = 0 falling\", restitution = 1.5 }"), "5:45: the restitution is 1.5"));
     CHECK(test::contains(wall("a = { when = \"y = 2 falling\" }"), "the start is behind the wall a"));
     CHECK(test::contains(wall("a = { restitution = 1 }"), "when = \"y = 0 falling\""));

@@ -35,6 +35,7 @@ void require_start_before_walls(const Scene& scene) {
     }
     start[scene.time] = 0;
     for (const Impact& impact : scene.impacts) {
+        if (impact.passes) continue;
         const auto value_at = [&](const GiNaC::exmap& place) {
             try {
                 return scene.value_of(impact.when.value.subs(place)).to_double();

@@ -102,7 +102,9 @@ std::vector<Key> make_keys() {
               {required(key("when", Holds::quoted, "The wall and its side, such as \"y = 0 falling\"")), count_key,
                key("restitution", Holds::formula, "The part of the normal velocity that is given back, 0 to 1"),
                key("rest", Holds::formula, "The run ends at an impact that the motion leaves more slowly than this"),
-               key("reset", Holds::names, "Positions and velocities after the impact, such as { \"x'\" = \"-x'\" }")}),
+               key("reset", Holds::names, "Positions and velocities after the impact, such as { \"x'\" = \"-x'\" }"),
+               key("passes", Holds::truth,
+                   "True: the motion goes on beyond the wall, with the reset; so it does at a time")}),
         section(
             "method", "How it is integrated",
             {word("family", {"lobatto", "gauss", "splitting"}, "The family of methods"),

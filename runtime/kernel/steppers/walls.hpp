@@ -2,7 +2,7 @@
 // Walls: what they are at a state, and what they do to a momentum there (D52).
 //
 // A wall is g(t, q) = 0, and the motion is on one side of it. Where it meets the wall the momentum jumps along dg/dq.
-// (R. C. Fetecau, J. E. Marsden, M. Ortiz, M. West 2003.)
+// (R. C. Fetecau, J. E. Marsden, M. Ortiz, M. West 2003.) Some let the motion pass, with a new state, as a kick does.
 #ifndef LOBATTO_KERNEL_WALLS_HPP
 #define LOBATTO_KERNEL_WALLS_HPP
 
@@ -26,7 +26,8 @@ struct Walls {
     real gradient[room * n]{}, rate[room]{};  // of impacts: dg/dq, and dg/dt at fixed q
     real restitution[room]{}, slow[room]{};   // slow: a speed; the motion that leaves a wall more slowly ends there
     real slack[count]{};                      // g as small as this is zero
-    real approach[room]{};  // dg/dt along the motion, where it is above rounding; below 0: towards the wall
+    real along[room]{};                       // dg/dt along the motion, where it is above rounding
+    real approach[room]{};                    // the same, below 0 towards the wall
 
     // Everything at (t, q, p) of a stepper.
     Status look(S& stepper, real t, const real* position, const real* momentum) {
@@ -50,7 +51,28 @@ struct Walls {
 
     // The sign of g where the motion is.
     static real side(S& stepper, int w) {
+        if (passes(w)) return stepper.passage_side[w];
         return w < impacts ? real(-K::event_direction[first + w]) : stepper.side(w - impacts);
+    }
+    static bool passes(int w) {
+        if constexpr (has_passages<K>()) return w < impacts && K::passage_of[w] != 0;
+        return false;
+    }
+    // Whether a crossing that leads away from this side gives the motion a new state.
+    static bool acts(int w, real from) {
+        if constexpr (has_passages<K>()) return K::passage_of[w] == 2 || real(K::passage_of[w]) * from < real(0);
+        return true;
+    }
+    // On the side of a passage from which the motion comes, or to which it goes, where it is right there.
+    void take_passages(S& stepper, bool comes, int only = -1) {
+        for (int w = 0; w < impacts; ++w) {
+            if (!passes(w) || (only >= 0 && w != only)) continue;
+            const real here = value[first + w], after = along[w] != real(0) ? along[w] : here,
+                       sign = fabs(here) > slack[w] ? here
+                              : comes               ? -after
+                                                    : after;
+            stepper.passage_side[w] = sign < real(0) ? real(-1) : real(1);
+        }
     }
     bool is_behind(int w) const { return value[first + w] * real(-K::event_direction[first + w]) < -slack[w]; }
     bool is_behind() const {  // of one of the impacts
@@ -59,7 +81,7 @@ struct Walls {
         return false;
     }
     bool comes_to_rest(int w) const { return fabs(approach[w]) < slow[w]; }
-    bool is_met(int w) const { return fabs(value[first + w]) <= slack[w] && approach[w] < real(0); }
+    bool is_met(int w) const { return !passes(w) && fabs(value[first + w]) <= slack[w] && approach[w] < real(0); }
 
     // (D52) What wall w does to the momentum.
     Status hit(S& stepper, int w) {
@@ -105,6 +127,7 @@ struct Walls {
         if constexpr (K::resets > 0) {
             real positions[K::resets * n], velocities[K::resets * n];
             Formulas<K>::reset(stepper.coefficients, time, q, velocity, positions, velocities);
+            cross_switches(stepper, positions + r * n, velocities + r * n);
             stepper.momentum(time, positions + r * n, velocities + r * n, p);
             return look(stepper, time, positions + r * n, p);
         }
@@ -113,6 +136,22 @@ struct Walls {
     }
 
 private:
+    // The sides of a state to which the motion has jumped; where it lies on a switch, as before. A switch may hold the
+    // sides of those before it.
+    void cross_switches(S& stepper, const real* position, const real* speed) {
+        for (int tries = 0; tries < switches_of<K>(); ++tries) {
+            bool crosses = false;
+            Formulas<K>::event(stepper.coefficients, time, position, speed, value);
+            for (int i = 0; i < switches_of<K>(); ++i) {
+                const real there = value[first + impacts + i] * stepper.side(i);
+                if (!(there < -slack[impacts + i])) continue;
+                stepper.side(i) = -stepper.side(i);
+                crosses = true;
+            }
+            if (!crosses) return;
+            K::prepare(stepper.parameters, stepper.step_size, stepper.coefficients);
+        }
+    }
     // An impulse of dg/dq on the motion at rest: the velocity that it gives, and dg/dt.
     Status push(S& stepper, int w, real* change, real& mobility) {
         real still[n] = {}, rest[n], pushed[n], without[n];
@@ -133,15 +172,16 @@ private:
         Formulas<K>::impact(stepper.coefficients, time, q, gradient, rate, restitution, slow);
         for (int w = 0; w < impacts; ++w) {
             const real step = fabs(stepper.step_size), passed = fabs(time) > step ? fabs(time) : step;
-            real along = rate[w], speed = fabs(rate[w]), moved = speed * passed;
+            real sum = rate[w], speed = fabs(rate[w]), moved = speed * passed;
             for (int c = 0; c < n; ++c) {
                 const real slope = gradient[w * n + c], way = fabs(velocity[c] * stepper.step_size);
-                along += slope * velocity[c];
+                sum += slope * velocity[c];
                 speed += fabs(slope * velocity[c]);
                 moved += fabs(slope) * (fabs(q[c]) > way ? fabs(q[c]) : way);
             }
             if (moved > stepper.wall_scale[w]) stepper.wall_scale[w] = moved;
-            approach[w] = fabs(along) <= few * speed ? real(0) : along * side(stepper, w);
+            along[w] = fabs(sum) <= few * speed ? real(0) : sum;
+            approach[w] = along[w] * side(stepper, w);
         }
     }
 };

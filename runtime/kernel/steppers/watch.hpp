@@ -3,7 +3,8 @@
 //
 // A step that meets a wall is cut there, at the end of a step of the same method; the momentum jumps (walls.hpp), and a
 // step of the rest of h leads back to the times of the run. So a step with impacts is one from t to t + h like any
-// other, and of the method's order. A switch cuts a step too; the rest follows other formulas.
+// other, and of the method's order. A switch cuts a step too; the rest follows other formulas. A kick cuts it, and
+// gives the motion another state.
 #ifndef LOBATTO_KERNEL_WATCH_HPP
 #define LOBATTO_KERNEL_WATCH_HPP
 
@@ -40,6 +41,7 @@ public:
         if constexpr (goes_back) {
             time = stepper.time();
             if constexpr (walls > 0) parameters = stepper.parameters;
+            for (int w = 0; w < walls; ++w) passage_side[w] = stepper.passage_side[w];
             for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
             stepper.momentum(p);
         }
@@ -69,6 +71,7 @@ private:
     S* rest;  // the steps from an impact to the end
     real time{}, q[n]{}, p[n]{};
     typename K::Parameters parameters{};
+    real passage_side[S::wall_room]{};
     int impacts{};  // of this step
 
     // Events and stops until theta.
@@ -87,6 +90,7 @@ private:
 
     void go_back(S& stepper) {
         if constexpr (walls > 0) stepper.parameters = parameters;
+        for (int w = 0; w < walls; ++w) stepper.passage_side[w] = passage_side[w];
         put(stepper, q, p, stepper.steps - 1);
     }
     // A state at one of the stepper's own times, with its parameters.
@@ -111,7 +115,7 @@ private:
             const bool is_hit = events.found > 0;
             const real theta = is_hit ? events.thetas[0] : real(1);
             const int number = is_hit ? events.numbers[0] : -1;
-            const Cut cut = !is_hit ? Cut::none : number - first_wall < impacts_of<K>() ? Cut::impact : Cut::passage;
+            const Cut cut = !is_hit ? Cut::none : throws(stepper, number - first_wall) ? Cut::impact : Cut::passage;
             if (rows != nullptr) {
                 status = find(*step, theta, cut, rows, count);
                 if (status != Status::ok) break;
@@ -141,13 +145,22 @@ private:
         return status;
     }
 
+    // Whether the state jumps at wall w.
+    static bool throws(S& stepper, int w) {
+        return w < impacts_of<K>() && (!Walls<K>::passes(w) || Walls<K>::acts(w, Walls<K>::side(stepper, w)));
+    }
+
     // Through a switch, or back from walls.
     Status pass(S& stepper, Walls<K>& wall, int number, real* rows, std::int64_t& count) {
         if constexpr (impacts_of<K>() > 0) {
-            if (number < impacts_of<K>()) return meet(stepper, wall, number, rows, count);
+            if (throws(stepper, number)) return meet(stepper, wall, number, rows, count);
         }
         (void)wall, (void)rows, (void)count;
         if (++impacts > most_impacts) return Status::impacts_accumulate;
+        if (Walls<K>::passes(number)) {
+            stepper.passage_side[number] = -stepper.passage_side[number];
+            return Status::ok;
+        }
         real& side = stepper.side(number - impacts_of<K>());
         side = -side;
         return K::prepare(stepper.parameters, stepper.step_size, stepper.coefficients);
@@ -171,6 +184,7 @@ private:
             last = lies ? first : met;
             const Status status = lies ? Status::ok : wall.hit(stepper, last);
             if (status != Status::ok) return status;
+            if (Walls<K>::passes(last)) wall.take_passages(stepper, false, last);
             if (rows == nullptr) continue;
             real* const row = rows + count++ * columns;
             row[0] = real(first_wall + last);

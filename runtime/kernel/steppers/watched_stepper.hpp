@@ -6,7 +6,8 @@
 // throw the motion back. The last K::switches walls change its formulas; their sides, 1 or -1, are the last parameters.
 // impact(k, q, G, g_t, e, rest) gives dg/dq, dg/dt at fixed q and the restitution of each wall, and the speed below
 // which the motion comes to rest there and ends. Where reset_of[] of it is not below 0, reset(k, q, velocity, q1,
-// velocity1) gives the state after that one of the K::resets.
+// velocity1) gives the state after that one of the K::resets. Where passage_of[] is not 0, the motion passes: its reset
+// is for crossings with g rising (1), falling (-1) or both (2). K::passages is how many these are.
 #ifndef LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 #define LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 
@@ -49,6 +50,13 @@ constexpr int impacts_of() {
         return 0;
 }
 template <class K>
+constexpr bool has_passages() {
+    if constexpr (impacts_of<K>() > 0)
+        return K::passages > 0;
+    else
+        return false;
+}
+template <class K>
 constexpr int stops_of() {
     if constexpr (K::events > 0)
         return K::stops;
@@ -72,6 +80,7 @@ struct WatchedStepper : Stepper<K> {
     static constexpr int walls = impacts_of<K>() + switches_of<K>(), wall_room = walls > 0 ? walls : 1;
     real wall_scale[wall_room]{};              // the most that went into each wall's function so far
     real scaled_at[1 + 2 * K::coordinates]{};  // the time, positions and velocities, as large, that this is known of
+    real passage_side[wall_room]{};            // of walls that let the motion pass: the sign of g where it is
 
     // At a state at one of its own times.
     Status restart(const real* position, const real* momentum, std::int64_t steps_since) {
