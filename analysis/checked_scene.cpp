@@ -56,6 +56,12 @@ std::vector<CheckedOutput> outputs_of(const Derivation& derivation, long operati
         switches += (switches.empty() ? "" : ", ") + text + (count > 1 ? fmt::format(" ({} times)", count) : "");
     if (!switches.empty())
         all.push_back({"not smooth", true, switches + ": a step ends where it changes, so that the order is kept", 0});
+    std::string jumps;
+    for (const Switch& one : derivation.scene.switches)
+        if (one.refracts && jumps.find(one.text) == std::string::npos) jumps += (jumps.empty() ? "" : ", ") + one.text;
+    if (!jumps.empty())
+        all.push_back(
+            {"refraction", true, jumps + ": where L jumps there, the motion is refracted or reflected (D67)", 0});
     return all;
 }
 

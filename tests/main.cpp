@@ -81,6 +81,7 @@ constexpr const char* compiled_quickly[] = {
     "/analysis/eliminated_test.cpp",
     "/analysis/hardest_steps_test.cpp",
     "/analysis/impacts_test.cpp",
+    "/analysis/refraction_test.cpp",
     "/analysis/measured_test.cpp",
     "/analysis/near_cuts_test.cpp",
     "/analysis/pulses_test.cpp",

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "analysis/accuracy/companion/measured_error.hpp"
+#include "analysis/accuracy/formulas/jumps.hpp"
 
 namespace lobatto {
 
@@ -25,6 +26,9 @@ std::vector<std::string> warnings_of(const SweepStudy& study, const Worst& error
                                            has_step && has_end ? "are those" : "is that", parameter.written,
                                            scene.evaluate(parameter.value, parameter.name).to_double()));
     }
+    std::vector<double> parameters;
+    for (const Parameter& one : scene.parameters) parameters.push_back(scene.evaluate(one.value, one.name).to_double());
+    for (const std::string& jump : jumps_of(scene, parameters)) warnings.push_back(jump);
     if (error.index >= 0 && error.value > large_error)
         warnings.push_back(fmt::format(
             "the error of trajectory {}, {}, is {:.2g} of the amplitude; take a smaller step, or more points",

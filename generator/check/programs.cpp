@@ -385,6 +385,20 @@ private:
         machine_.run("event");
         compare("emitted events", formulas_(values), machine_.get("value", values.size()));
         if (!derivation_.scene.impacts.empty()) impacts();
+        refractions();
+    }
+
+    void refractions() {
+        std::vector<ex> gradient, rate;
+        for (const Switch& one : derivation_.scene.switches) {
+            if (!one.refracts) continue;
+            for (const GiNaC::symbol& q : system_.q) gradient.push_back(one.value.diff(q));
+            rate.push_back(one.value.diff(system_.t));
+        }
+        if (rate.empty()) return;
+        machine_.run("refraction");
+        compare("emitted refractions", formulas_(gradient), machine_.get("G", gradient.size()));
+        compare("emitted refractions", formulas_(rate), machine_.get("g_t", rate.size()));
     }
 
     void impacts() {

@@ -21,6 +21,11 @@ const Declaration of_impacts = {"impact",
                                 "void",
                                 {{in, "q"}, {out, "G"}, {out, "g_t"}, {out, "restitution"}, {out, "rest"}},
                                 true};
+const Declaration of_refractions = {"refraction",
+                                    "(D67) Of each switch u(q, t) = 0 at which L may jump: du/dq, du/dt at fixed q.",
+                                    "void",
+                                    {{in, "q"}, {out, "G"}, {out, "g_t"}},
+                                    true};
 const Declaration of_resets = {"reset",
                                "The state after each impact that the scene gives one.",
                                "void",
@@ -58,6 +63,7 @@ const std::vector<Declaration>& separable() {
         of_events,
         of_impacts,
         of_resets,
+        of_refractions,
     };
     return table;
 }
@@ -135,6 +141,7 @@ const std::vector<Declaration>& general() {
         of_events,
         of_impacts,
         of_resets,
+        of_refractions,
     };
     return table;
 }
@@ -219,6 +226,8 @@ constexpr const char* names_of_members[] = {"name",
                                             "resets",
                                             "switches",
                                             "reset_of",
+                                            "refractions",
+                                            "refraction_of",
                                             "passages",
                                             "passage_of",
                                             "parameter",

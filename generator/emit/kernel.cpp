@@ -263,7 +263,8 @@ private:
 
     std::string body(const Declaration& declaration) const {
         const std::string name = declaration.program;
-        if (d_.structure.looped && name != "event" && name != "impact" && name != "reset") return looped_.body(name);
+        if (d_.structure.looped && name != "event" && name != "impact" && name != "reset" && name != "refraction")
+            return looped_.body(name);
         const auto program =
             std::find_if(p_.programs.begin(), p_.programs.end(), [&](const Program& p) { return p.name == name; });
         if (program == p_.programs.end()) return "";

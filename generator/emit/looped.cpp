@@ -282,7 +282,7 @@ std::string LoopedText::body(const std::string& function) const {
                        : clear_entries + "S0[e] = real(0);\n" + loops(LoopPart::Of::quadratic, "q") +
                              statements(name_of({LoopPart::rest, LoopPart::Of::quadratic}), "") + clear_entries +
                              "S0[e] *= k.inverse_mass[entry_row[e]];\n";
-        if (function == "energy" && d_.scene.outputs.energy)
+        if (function == "energy" && d_.scene.has_energy())
             return "        number sum = number(0);\n" + coordinates +
                    "sum += p[i] * (real(0.5) * k.inverse_mass[i] * p[i]);\n" + loops(LoopPart::Of::energy, "q") +
                    statements(name_of({LoopPart::rest, LoopPart::Of::energy}), "") + "        return sum;\n";
@@ -309,7 +309,7 @@ std::string LoopedText::body(const std::string& function) const {
         return join + "        number g[2 * coordinates], H[entries];\n        node(k, " + time + "z, g, H);\n" +
                coordinates + "Lv[i] = g[i];\n" + coordinates +
                "Lq[i] = g[coordinates + i];\n        for (int e = 0; e < mass_entries; ++e) M[e] = H[mass_from[e]];\n";
-    if (function == "energy" && d_.scene.outputs.energy)
+    if (function == "energy" && d_.scene.has_energy())
         return join + "        number sum = number(0);\n" + loops(LoopPart::Of::energy, "z") +
                statements(name_of({LoopPart::rest, LoopPart::Of::energy}), "") + "        return sum;\n";
     return "";

@@ -241,6 +241,13 @@ std::string watched_shapes(const Scene& scene) {
     line(text, fmt::format("int impacts = {}", scene.impacts.size()), "walls that throw it back");
     line(text, fmt::format("int switches = {}", scene.switches.size()),
          "where formulas change; the last parameters are the sides");
+    if (!scene.switches.empty()) {
+        std::vector<int> refraction_of;
+        int refractions = 0;
+        for (const Switch& one : scene.switches) refraction_of.push_back(one.refracts ? refractions++ : -1);
+        line(text, fmt::format("int refractions = {}", refractions), "switches at which the Lagrangian may jump");
+        text += integer_table("refraction_of", refraction_of);
+    }
     if (scene.impacts.empty()) return text;
     line(text, fmt::format("int resets = {}", resets), "walls with an outcome of their own");
     text += integer_table("reset_of", reset_of);
@@ -251,7 +258,6 @@ std::string watched_shapes(const Scene& scene) {
 
 std::string shapes(const Derivation& d, Precision precision, const std::string& name) {
     const Structure& structure = d.structure;
-    const Outputs& outputs = d.scene.outputs;
     static constexpr const char* forms[] = {"linear_map", "separable", "general"};
     const int controls = static_cast<int>(d.quadrature.control.size());
     const bool multiplier = d.scene.method.family == Family::lobatto;
@@ -277,7 +283,7 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
                   : "Newton's iteration alone");
     line(text, fmt::format("bool linear = {}", structure.linear), "all second derivatives are constant");
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
-    line(text, fmt::format("bool has_energy = {}", outputs.energy), "asked for by the scene");
+    line(text, fmt::format("bool has_energy = {}", d.scene.has_energy()), "asked for by the scene");
     line(text, fmt::format("bool has_tangent = {}", has_tangent(d)), "the derivative of a step");
     if (structure.form() == Form::general)
         line(text, fmt::format("bool clocked = {}", d.scene.clock.has_value()),

@@ -287,11 +287,7 @@ private:
             fail(formula.at, frame,
                  fmt::format("{} needs a number here: numbers, indices and parameters declared constant",
                              formula.at.text));
-        for (const Switch& known : names_->switches)
-            if (known.value.is_equal(u.expression)) return as_side(known.side, u);
-        names_->switches.push_back({u.expression, GiNaC::symbol(fmt::format("side_{}", names_->switches.size() + 1)),
-                                    fmt::format("{} in {}", formula.at.text, frame.formula), formula.at.at});
-        return as_side(names_->switches.back().side, u);
+        return as_side(names_->side_of(u.expression, std::string(formula.at.text), frame.formula, formula.at.at), u);
     }
 
     // Of constants the arithmetic itself finds what has no value.

@@ -13,6 +13,18 @@ Name& Names::add_parameter(const std::string& name, const std::vector<GiNaC::ex>
     return added;
 }
 
+GiNaC::symbol Names::side_of(const GiNaC::ex& u, const std::string& function, const std::string& formula, Position at) {
+    const bool may_jump = function == "sign" || function == "if";
+    for (Switch& known : switches)
+        if (known.value.is_equal(u)) {
+            known.may_jump = known.may_jump || may_jump;
+            return known.side;
+        }
+    switches.push_back({u, GiNaC::symbol(fmt::format("side_{}", switches.size() + 1)),
+                        fmt::format("{} in {}", function, formula), at, may_jump});
+    return switches.back().side;
+}
+
 Name& Names::add_input(const std::string& name, const std::vector<GiNaC::ex>& values, bool array) {
     Name& added = add_parameter(name, values, array);
     added.role = Name::Role::input;

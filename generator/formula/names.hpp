@@ -69,6 +69,8 @@ struct Switch {
     GiNaC::symbol side;
     std::string text;  // "abs in the Lagrangian"
     Position at;
+    bool may_jump = false;  // of sign and if, whose pieces may differ where u = 0
+    bool refracts = false;  // the Lagrangian may jump at a place u(q, t) = 0
 };
 
 // A file of measured values: the number of its spline, and where it is named first.
@@ -91,6 +93,9 @@ struct Names {
     Name& add_coordinate(const std::string& name, const std::vector<GiNaC::symbol>& positions,
                          const std::vector<GiNaC::symbol>& velocities, bool array = false);
     Name& add_time(const std::string& name, const GiNaC::symbol& time);
+
+    // The side of the switch u, which is known or new; `function`: abs, sign ...
+    GiNaC::symbol side_of(const GiNaC::ex& u, const std::string& function, const std::string& formula, Position at);
 
     // For suggestions; without those that move unless they are allowed.
     std::vector<Spelling> spellings(bool motion_allowed) const;

@@ -33,9 +33,10 @@ protected:
     }
     Ids times(const IdMatrix& matrix, const Ids& vector);
     void program(const std::string& name, const std::string& array, const Ids& values);
-    // The programs event, impact and reset: what is watched in each step, and what walls do.
+    // The programs event, impact, reset and refraction: what is watched in each step, and what walls and switches do.
     void events();
     void impacts();
+    void refractions();
     // Inputs velocity[k] in the place of the scene's velocities.
     void velocities_as_inputs();
 

@@ -84,7 +84,7 @@ private:
         if (!bodies) p_.programs.push_back(std::move(stage));
         constraints();
         if (d_.scene.clock) p_.programs.push_back({"clock", {{"", convert(d_.scene.clock->rate), Effect::give_back}}});
-        if (d_.scene.outputs.energy || d_.scene.clock)
+        if (d_.scene.has_energy() || d_.scene.clock)
             p_.programs.push_back({"energy", {{"", energy(), Effect::give_back}}});
     }
 

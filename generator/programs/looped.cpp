@@ -115,7 +115,7 @@ private:
             if (!constant.is_zero())
                 quadratic.outputs.push_back({at("S0", known->second), convert(constant), Effect::add});
         }
-        if (d_.scene.outputs.energy) {
+        if (d_.scene.has_energy()) {
             Ids values;
             const std::vector<GiNaC::symbol> velocities(variables.begin(),
                                                         variables.begin() + (general_ ? static_cast<long>(n_) : 0));
@@ -181,7 +181,7 @@ private:
             if ((d_.structure.absorbed() || d_.structure.diagonal_part()) && !constant.is_zero())
                 quadratic.outputs.push_back({fmt::format("S0[{}]", place), convert(constant), Effect::add});
         }
-        if (d_.scene.outputs.energy && !is_force) {
+        if (d_.scene.has_energy() && !is_force) {
             std::vector<GiNaC::symbol> velocities;
             for (std::size_t j = 0; general_ && j < element.x.size(); ++j)
                 if (element.rows.front()[j] < static_cast<int>(n_)) velocities.push_back(element.x[j]);

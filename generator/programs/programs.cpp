@@ -65,6 +65,20 @@ void ProgramBuilder::events() {
     if (values.empty()) return;
     program("event", "value", values);
     if (!d_.scene.impacts.empty()) impacts();
+    refractions();
+}
+
+void ProgramBuilder::refractions() {
+    Program program{"refraction", {}};
+    std::size_t number = 0;
+    for (const Switch& one : d_.scene.switches) {
+        if (!one.refracts) continue;
+        for (std::size_t k = 0; k < n_; ++k)
+            program.outputs.push_back({at("G", number * n_ + k), convert(one.value.diff(d_.system.q[k]))});
+        program.outputs.push_back({at("g_t", number), convert(one.value.diff(d_.system.t))});
+        ++number;
+    }
+    if (number > 0) p_.programs.push_back(std::move(program));
 }
 
 void ProgramBuilder::impacts() {

@@ -85,7 +85,7 @@ private:
             velocity.push_back(in("velocity", k));
         }
         const Ids rates = times(inverse_mass_, p);
-        if (d_.scene.outputs.energy) {
+        if (d_.scene.has_energy()) {
             Ids energy;
             for (std::size_t k = 0; k < n_; ++k)
                 energy.push_back(

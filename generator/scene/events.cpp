@@ -220,6 +220,12 @@ void SystemReader::add_switches() {
         const int side = value.is_positive() ? 1 : -1;
         start[one.side] = side;
         scene_.parameters.push_back({name, "", side, one.side, name, false, true});
+        const auto holds = [&](const auto symbol) {
+            return std::any_of(scene_.coordinates.begin(), scene_.coordinates.end(),
+                               [&](const Coordinate& c) { return one.value.has(c.*symbol); });
+        };
+        one.refracts = one.may_jump && scene_.lagrangian.has(one.side) && holds(&Coordinate::position) &&
+                       !holds(&Coordinate::velocity);
         scene_.switches.push_back(one);
     }
 }

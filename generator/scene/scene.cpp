@@ -338,6 +338,11 @@ std::vector<std::pair<std::size_t, Event>> Scene::ends() const {
     return all;
 }
 
+bool Scene::has_energy() const {
+    return outputs.energy ||
+           std::any_of(switches.begin(), switches.end(), [](const Switch& one) { return one.refracts; });
+}
+
 std::vector<Event> Scene::watched() const {
     std::vector<Event> all = reported();
     for (const Switch& one : switches) all.push_back({one.text, one.value, 0, one.at});

@@ -229,6 +229,8 @@ struct Scene {
     // Of these, with their numbers, those that may end the run: stops, and walls with `rest`.
     std::vector<std::pair<std::size_t, Event>> ends() const;
     bool may_end_early() const { return !ends().empty(); }
+    // Whether kernels compute it: where the scene asks for it, and where it tells how the motion is refracted.
+    bool has_energy() const;
     bool is_cut() const { return !impacts.empty() || !switches.empty(); }  // whether steps may be
 
     // A formula with the sides of switches where the motion is, not where it starts: for evaluation, not derivation.

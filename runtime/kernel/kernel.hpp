@@ -60,6 +60,7 @@
 #include "steppers/sides.hpp"
 #include "steppers/splitting.hpp"
 #include "steppers/walls.hpp"
+#include "steppers/refraction.hpp"
 #include "steppers/watch.hpp"
 #include "steppers/watched_stepper.hpp"
 

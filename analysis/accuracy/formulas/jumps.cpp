@@ -38,10 +38,10 @@ public:
         }
     }
 
-    // The median jump where u = 0, and the size of the pieces; nothing where that is not known.
-    std::optional<std::pair<double, double>> of(const Switch& one) {
+    // The median jump of a formula where u = 0, and the size of the pieces; nothing where that is not known.
+    std::optional<std::pair<double, double>> of(const Switch& one, const GiNaC::ex& formula) {
         const auto piece = [&](int side) {
-            return Tape::of(scene_.along_motion(scene_.lagrangian.subs(one.side == side)), symbols_);
+            return Tape::of(scene_.along_motion(formula.subs(one.side == side)), symbols_);
         };
         const std::optional<Tape> above = piece(1), below = piece(-1),
                                   u = Tape::of(scene_.along_motion(one.value), symbols_);
@@ -66,9 +66,9 @@ public:
     }
 
 private:
-    // du/dx of the first position, else velocity, in which u is linear: number k.
+    // du/dv of the first velocity in which u is linear: number k.
     std::optional<Tape> slope_of(const Switch& one, std::size_t& k) const {
-        for (k = parameters_; k + 1 < symbols_.size(); ++k) {
+        for (k = parameters_ + scene_.coordinates.size(); k + 1 < symbols_.size(); ++k) {
             const GiNaC::ex slope = one.value.diff(symbols_[k]);
             if (!slope.is_zero() && !slope.has(symbols_[k])) return Tape::of(scene_.along_motion(slope), symbols_);
         }
@@ -92,13 +92,20 @@ std::vector<std::string> jumps_of(const Scene& scene, const std::vector<double>&
     for (std::size_t i = 0; i < std::min(scene.switches.size(), most_switches); ++i) {
         const Switch& one = scene.switches[i];
         if (!scene.lagrangian.has(one.side)) continue;
-        const auto jump = jumps.of(one);
-        if (jump && jump->first > notable * jump->second)
+        const auto look_at = [&](const GiNaC::ex& formula, const std::string& what) {
+            const auto jump = jumps.of(one, formula);
+            if (!jump || !(jump->first > notable * jump->second)) return false;
             sentences.push_back(fmt::format(
-                "the Lagrangian jumps, by about {:.2g}, where {} (line {} column {}) goes from one piece to "
-                "the other. No "
-                "motion follows that: write both pieces so that they have one value there",
-                jump->first, one.text, one.at.line, one.at.column));
+                "{} jumps, by about {:.2g}, where {} (line {} column {}) goes from one piece to the other at some "
+                "velocity. No motion follows that: write the pieces so that they, and their derivatives by the "
+                "velocity, have one value there",
+                what, jump->first, one.text, one.at.line, one.at.column));
+            return true;
+        };
+        bool is_told = look_at(scene.lagrangian, "the Lagrangian");
+        for (const Coordinate& x : scene.coordinates)
+            is_told = is_told || (one.value.has(x.velocity) &&
+                                  look_at(scene.lagrangian.diff(x.velocity), "the momentum of " + x.written));
     }
     return sentences;
 }

@@ -105,8 +105,9 @@ struct KineticCourse {
 constexpr double halved = 0.5, off_dead_points = 0.47;  // a half of the step may end at the dead point, too
 
 std::string why(const Scene& scene, double step, bool jumps, bool too_coarse) {
-    const auto jump = std::find_if(scene.switches.begin(), scene.switches.end(),
-                                   [&](const Switch& one) { return scene.lagrangian.has(one.side); });
+    const auto jump = std::find_if(scene.switches.begin(), scene.switches.end(), [&](const Switch& one) {
+        return one.may_jump && !one.refracts && scene.lagrangian.has(one.side);
+    });
     if (jump != scene.switches.end() && !jumps)
         return fmt::format(
             "The step is too long for the forces met there, or the Lagrangian jumps where it goes from one piece to "

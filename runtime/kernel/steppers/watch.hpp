@@ -3,14 +3,15 @@
 //
 // A step that meets a wall is cut there, at the end of a step of the same method; the momentum jumps (walls.hpp), and a
 // step of the rest of h leads back to the times of the run. So a step with impacts is one from t to t + h like any
-// other, and of the method's order. A switch cuts a step too; the rest follows other formulas. A kick cuts it, and
-// gives the motion another state.
+// other, and of the method's order. A switch cuts a step too; the rest follows other formulas, and where L jumps there
+// the momentum does, too (refraction.hpp). A kick cuts it, and gives the motion another state.
 #ifndef LOBATTO_KERNEL_WATCH_HPP
 #define LOBATTO_KERNEL_WATCH_HPP
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "events.hpp"
+#include "refraction.hpp"
 #include "sides.hpp"
 
 namespace lobatto {
@@ -161,7 +162,16 @@ private:
             stepper.passage_side[number] = -stepper.passage_side[number];
             return Status::ok;
         }
-        real& side = stepper.side(number - impacts_of<K>());
+        const int number_of_switch = number - impacts_of<K>();
+        if constexpr (has_refractions<K>()) {
+            if (K::refraction_of[number_of_switch] >= 0) {
+                real momentum[n];
+                const Status status =
+                    Refraction<K>(stepper, number_of_switch, wall.time, wall.q, wall.p).pass(momentum);
+                return status == Status::ok ? wall.look(stepper, wall.time, wall.q, momentum) : status;
+            }
+        }
+        real& side = stepper.side(number_of_switch);
         side = -side;
         return K::prepare(stepper.parameters, stepper.step_size, stepper.coefficients);
     }

@@ -437,6 +437,10 @@ TEST_CASE("the names that a scene may not take are those that kernels declare") 
                 wall.reset_velocity.push_back(-coordinate.velocity);
             }
             scene.impacts.push_back(wall);
+            Switch step{scene.coordinates[0].position - 5, GiNaC::symbol("side_1"), "if", {}, true, true};
+            scene.parameters.push_back({"side_1", "", -1, step.side, "side_1", false, true});
+            scene.lagrangian += step.side;
+            scene.switches.push_back(step);
         }
         if (name == "swinging_atwood") {  // and one whose momentum is a difference at rest
             const GiNaC::symbol& v = scene.coordinates[0].velocity;
