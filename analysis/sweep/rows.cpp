@@ -114,6 +114,8 @@ SweepRows::SweepRows(const Scene& scene, const SweepStarts& starts, std::int64_t
 SweepFigures SweepRows::append(std::vector<TableCell>& rows, const EnsembleTrajectory& trajectory,
                                std::int64_t kept_every, const Verdict& verdict, double* state) const {
     const Records& kept = trajectory.kept;
+    const auto events = static_cast<std::int64_t>(scene_.outputs.events.size());
+    const std::int64_t stop = trajectory.stop >= 0 ? trajectory.stop - events + 1 : 0;
     for (std::int64_t i = 0; i < kept.count; ++i) {
         const bool last = i + 1 == kept.count;
         if (!last && (every_ == 0 || i * kept_every % every_ != 0)) continue;
@@ -129,10 +131,7 @@ SweepFigures SweepRows::append(std::vector<TableCell>& rows, const EnsembleTraje
         }
         put(static_cast<std::int64_t>(last ? verdict.status : LOBATTO_OK));
         put(last ? trajectory.steps_done : i * kept_every);
-        if (stop_ != none) {
-            const auto first = static_cast<std::int64_t>(scene_.outputs.events.size()) - 1;
-            put(last && trajectory.stop >= 0 ? trajectory.stop - first : std::int64_t(0));
-        }
+        if (stop_ != none) put(last ? stop : std::int64_t(0));
         put(row[0]);
         for (std::size_t k = 0; k < scene_.outputs.kept.size(); ++k)
             put(k < trajectory.reduced->size() ? (*trajectory.reduced)[k] : not_said);
@@ -150,7 +149,8 @@ SweepFigures SweepRows::append(std::vector<TableCell>& rows, const EnsembleTraje
             end[0],
             verdict.error,
             trajectory.energy_error_final,
-            trajectory.energy_error_largest};
+            trajectory.energy_error_largest,
+            stop};
 }
 
 SweepFigures SweepRows::read(const TableCell* row, double* state) const {
@@ -159,8 +159,14 @@ SweepFigures SweepRows::read(const TableCell* row, double* state) const {
         state[k] = real(q_ == none ? none : q_ + k * parts_);
         state[n_ + k] = real(p_ == none ? none : p_ + k * parts_);
     }
-    return {whole_in(row[0]), whole_in(row[status_]), whole_in(row[steps_]), real(time_), real(error_), real(energy_),
-            not_said};
+    return {whole_in(row[0]),
+            whole_in(row[status_]),
+            whole_in(row[steps_]),
+            real(time_),
+            real(error_),
+            real(energy_),
+            not_said,
+            stop_ == none ? 0 : whole_in(row[stop_])};
 }
 
 }  // namespace lobatto

@@ -22,6 +22,7 @@ struct SweepFigures {
     double time = 0;                                    // at the end
     double error = 0;                                   // not a number: not measured
     double energy_error = 0, energy_error_largest = 0;  // not numbers: the scene keeps no energy
+    std::int64_t stop = 0;                              // that ended it, from 1 on; 0: none
 };
 
 // Cells are 8 bytes: the bits of an int64 or a double, as the column says. A row is one cell for each column.

@@ -54,6 +54,7 @@ public:
     const SweepStarts& starts() const { return *starts_; }
     const SweepRows& rows() const { return *rows_; }
     bool measures() const { return options_.measures; }
+    const Overrides& overrides() const { return options_.overrides; }
     const CudaDevice* device() const { return device_.get(); }  // that takes the steps; null: the processor does
 
     // One setting of the method: what its trajectories share.

@@ -47,6 +47,9 @@ void SweepTally::add(const SweepFigures& figures, const double* state) {
         if (failures_.size() < failures_kept) failures_.push_back(figures);
         return;
     }
+    const auto stop = static_cast<std::size_t>(figures.stop);
+    if (stops_.size() <= stop) stops_.resize(stop + 1);
+    ++stops_[stop];
     tally.error.see(figures.error, figures.index);
     if (std::isnan(figures.error)) ++tally.unmeasured;
     tally.energy_error.see(figures.energy_error_largest, figures.index);

@@ -50,6 +50,8 @@ public:
     std::int64_t trajectories() const { return trajectories_; }
     std::int64_t failed() const { return trajectories_ - count_of_[LOBATTO_OK]; }
     std::int64_t count_of(int status) const { return count_of_[static_cast<std::size_t>(status)]; }
+    // How many of those that succeeded a stop ended, from 1 on; 0: none did.
+    std::int64_t count_of_stop(std::size_t stop) const { return stop < stops_.size() ? stops_[stop] : 0; }
     const std::vector<SweepFigures>& first_failures() const { return failures_; }  // five at most
     // Of all that succeeded, but for those that were read back from a table without these columns.
     const Sums& q(std::size_t k) const { return q_[k]; }
@@ -65,6 +67,7 @@ private:
     std::size_t n_;
     std::int64_t count_of_setting_, trajectories_ = 0;
     std::array<std::int64_t, LOBATTO_STATUSES> count_of_{};
+    std::vector<std::int64_t> stops_;
     std::vector<SweepFigures> failures_;
     std::vector<Sums> q_, p_;
     Sums energy_error_;

@@ -80,6 +80,7 @@ TableHead head_of(const SweepStudy& study) {
         if (!starts.varies(Role::parameter, i) && !scene.parameters[i].is_side)
             parameters.push_back(fmt::format("{} = {}", scene.parameters[i].name, exact_text(start.parameters[i])));
     if (!parameters.empty()) head.add("parameters", fmt::format("{}", fmt::join(parameters, ", ")));
+    for (const std::string& set : study.overrides().set) head.add("set", set);
     for (const auto& [what, text] : starts.sources()) head.add(what, text);
     for (const auto& [number, event] : scene.ends())
         head.add(fmt::format("stop {}", number - scene.outputs.events.size() + 1), event.text);

@@ -21,6 +21,17 @@ std::string spread_text(const Spread& spread) {
                        spread.rms);
 }
 
+// How many each stop ended: a reaction probability, say.
+void print_stops(const Scene& scene, const SweepTally& tally) {
+    const auto ends = scene.ends();
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+        const auto& [number, event] = ends[i];
+        print_row(i == 0 ? "stopped" : "",
+                  fmt::format("{} by '{}'", tally.count_of_stop(number - scene.outputs.events.size() + 1), event.text));
+    }
+    if (!ends.empty() && tally.count_of_stop(0) > 0) print_row("", fmt::format("{} by none", tally.count_of_stop(0)));
+}
+
 // A row for each setting: a study of convergence.
 void print_settings(const SweepStudy& study, const SweepTally& tally) {
     const SweepStarts& starts = study.starts();
@@ -117,6 +128,7 @@ void print_sweep(const SweepStudy& study, const SweepTally& tally, const StudyTi
             all.error.index >= 0 ? "  not of" : "measured error",
             fmt::format("{}{} could not be followed to the stop in other steps",
                         all.error.index >= 0 ? "" : "none: ", counted(all.unmeasured, "trajectory", "trajectories")));
+    print_stops(scene, tally);
     print_state(scene, tally);
 }
 

@@ -533,6 +533,16 @@ TEST_CASE("dry friction takes 2 mu from each half period, until it holds") {
     const Ended held = run(fmt::format(fmt::runtime(slide), 0.3) + method("points = 8", 0.25, 40));
     CHECK(held.result.status == LOBATTO_IMPACTS_ACCUMULATE);  // at x = -0.4 + 0.6, below 0.3, after two half periods
     CHECK(held.result.time == 6.25);
+    // A stop where the velocity is 0 ends the motion there, too: that of its direction.
+    const std::string sticks = fmt::format(fmt::runtime(slide), 0.3) + method("points = 8", 0.25, 40);
+    const Ended arrested = run(sticks + "stop = \"x' = 0 rising\"\n"),
+                other = run(sticks + "stop = \"x' = 0 falling\"\n");
+    CHECK(arrested.result.status == LOBATTO_OK);
+    CHECK(std::fabs(arrested.result.time - pi) < 1e-13);
+    CHECK(std::fabs(arrested.result.q[0] + 0.4) < 1e-13);
+    CHECK(other.result.status == LOBATTO_OK);
+    CHECK(std::fabs(other.result.time - 2 * pi) < 1e-13);
+    CHECK(std::fabs(other.result.q[0] + 0.2) < 1e-13);
 }
 
 TEST_CASE("steps are cut where a formula is not smooth: whole numbers of abs, max and if, to rounding") {

@@ -61,8 +61,11 @@ bool SweepWatch::prepare(const EnsembleTrajectory& trajectory) {
 
 void SweepWatch::observe(const EnsembleTrajectory& trajectory) {
     const std::size_t n = outline_.system.q.size();
-    // With a clock h is a time of the clock, and frequencies are of the physical time.
-    if (outline_.scene.clock || n > most_coordinates || looks_ == most_looks || !prepare(trajectory)) return;
+    // With a clock h is a time of the clock, and frequencies are of the physical time. A force that jumps near an end
+    // has no frequency.
+    if (outline_.scene.clock || !outline_.scene.switches.empty() || n > most_coordinates || looks_ == most_looks ||
+        !prepare(trajectory))
+        return;
     ++looks_;
     const double* const row = trajectory.kept.rows + (trajectory.kept.count - 1) * trajectory.kept.columns;
     const std::vector<double> q(row + 1, row + 1 + n), p(row + 1 + n, row + 1 + 2 * n);

@@ -102,6 +102,7 @@ private:
 
     Status look_with_walls(S& stepper, real* rows, std::int64_t& count) {
         const real end = stepper.time();
+        Arrest arrest;
         Walls<K> wall;
         Status status = wall.look(stepper, time, q, p);
         S* step = &stepper;
@@ -130,6 +131,8 @@ private:
                     Sides<K>::scale_switches(stepper, row[0], row + 1, row + 1 + n,
                                              impacts > 0 && (impacts & (impacts - 1)) == 0);
             if (status == Status::ok) status = wall.look(stepper, row[0], row + 1, row + 1 + n);
+            if (status == Status::ok && cut == Cut::passage && rows != nullptr)
+                arrest.see(*step, wall, number - first_wall, count);
             if (status == Status::ok) status = pass(stepper, wall, number - first_wall, rows, count);
             if (status != Status::ok) break;
             cut_at[cuts++] = wall.time;
@@ -143,8 +146,35 @@ private:
             status = take_rest(stepper, wall, left, cut == Cut::passage ? &known : nullptr);
         }
         if (status == Status::ok && step == rest) finish(stepper);
-        return status;
+        if (status != Status::impacts_accumulate || arrest.stop < 0) return status;
+        count = arrest.count;
+        real* const row = rows + count++ * columns;
+        row[0] = real(arrest.stop);
+        for (int i = 1; i < columns; ++i) row[i] = arrest.row[i - 1];
+        return Status::stopped;
     }
+
+    // Where friction holds a motion for good: a stop that is zero there, such as that of the velocity, ends it.
+    struct Arrest {
+        int stop = -1;
+        std::int64_t count{};
+        real row[columns]{};
+
+        void see(const S& step, const Walls<K>& wall, int w, std::int64_t rows) {
+            for (int s = first_wall - stops; s < first_wall && stop < 0; ++s) {
+                if (!(fabs(wall.value[s]) <= wall.slack[w]) ||
+                    real(K::event_direction[s]) * step.event_values[s] > real(0))
+                    continue;
+                stop = s;
+                count = rows;
+                row[0] = wall.time;
+                for (int c = 0; c < n; ++c) {
+                    row[1 + c] = wall.q[c];
+                    row[1 + n + c] = wall.p[c];
+                }
+            }
+        }
+    };
 
     // Whether the state jumps at wall w.
     static bool throws(S& stepper, int w) {

@@ -160,6 +160,10 @@ TEST_CASE("a trajectory that meets a stop ends there, alone, and the others go o
     CHECK(std::fabs(test::column_of(states, "q")[1] + std::numbers::pi) < 1e-13);
     CHECK(std::fabs(test::column_of(states, "p_q")[2] - std::sqrt(5.0)) < 1e-12);
     CHECK(test::column_of(states, "stop") == std::vector<double>{0, 2, 1});
+    const test::Finished counted = place.sweep({scene, "--vary", "q'=1,-2.5,3,3.1"});
+    CHECK(test::contains(counted.out,
+                         "  stopped                 2 by 'q = pi'\n                          1 by 'q = -pi'\n"
+                         "                          1 by none\n"));
 }
 
 TEST_CASE("a sweep says what it did and where its table is") {
