@@ -476,6 +476,18 @@ TEST_CASE("a motion that rounding or the step would throw back where the clock i
     CHECK(swept.err.find("2 of 4 trajectories failed: 2 t + h equals t or the clock is 0.") != std::string::npos);
 }
 
+TEST_CASE("many small steps on the way to a near passage are not taken for a clock that comes to 0") {
+    // The steps pass 5, then 2, then 1.4 times less of the time at each doubling, until r = 7.07.
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml",
+                     "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
+                     "x = { position = -100, velocity = 0.3 }\ny = { position = 14, velocity = 0 }\n[method]\n"
+                     "points = 3\nclock = \"auto\"\n[run]\nstep = 0.003\nuntil = 1000\n[output]\nevery = 500\n");
+    const test::Finished done =
+        test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet", "--unmeasured"});
+    CHECK_MESSAGE(done.exit_code == 0, done.err);
+}
+
 TEST_CASE("a clock that runs away with an escaping motion is told, and one that grows less goes on") {
     const test::TemporaryFolder folder;
     const auto run = [&](const std::string& clock) {
