@@ -328,6 +328,23 @@ TEST_CASE("a sweep with a clock compares all that comes before a stop, also wher
     }
 }
 
+TEST_CASE("an error at a stop is measured there, however many steps lead to it from the last comparison") {
+    const test::TemporaryFolder folder;
+    // 76,000 steps before the first comparison, at t = 10: more than one call of a kernel takes.
+    test::write_text(folder / "scene.toml", kepler(0.5, "points = 4\nclock = \"r^(3/2)\"",
+                                                   "step = 0.00005\nuntil = 610\nstop = \"y = -0.5 falling\""));
+    const test::Finished one =
+        test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--every", "10"});
+    INFO(one.out << one.err);
+    CHECK(one.exit_code == 0);
+    CHECK(test::contains(one.out, "of the amplitude at the end"));
+    const test::Finished many =
+        test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "e=0.4,0.5", "-o", folder / "sweep.csv"});
+    INFO(many.err);
+    CHECK(many.exit_code == 0);
+    for (const auto& row : test::read_trajectory(folder / "sweep.csv").rows) CHECK(row.back() < 1e-9);
+}
+
 TEST_CASE("means over a motion with a clock are those over the time") {
     const test::TemporaryFolder folder;
     const double pi = std::acos(-1);

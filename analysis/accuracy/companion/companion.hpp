@@ -144,6 +144,7 @@ private:
     std::vector<Point> run_;         // of the run, at comparisons
     std::vector<double> stop_time_;  // where a stop ended it, as parts; empty: none did
     Point stop_{at_stop, {}};
+    bool is_short_of_stop_ = false;        // to go there took too long
     Range range_;                          // of the run's kept states
     mutable std::mutex mutex_;             // guards what follows
     std::vector<Point> companion_;         // of the companion

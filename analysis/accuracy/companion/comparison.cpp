@@ -224,7 +224,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     }
     if (!error.lost_after && count > 0 && is_held(amplitude))
         lose(error, time_of(run_[count - 1]), run_[count - 1].row);
-    error.complete = count == run_.size();
+    error.complete = count == run_.size() && !is_short_of_stop_;
     error.rests = run_rests();
     if (!error.rests) error.doubling = doubling_of(course);  // else what grows are amplitudes, of the companion
     // Errors that grow exponentially do not shrink again: two motions that were out of step have met by chance.
