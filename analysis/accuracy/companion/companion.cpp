@@ -48,6 +48,7 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
       narrow_(outline.system),
       constraints_(outline.system),
       parameters_(request.parameters),
+      changes_energy_(!outline.conserves_energy() && kernel->has_energy != 0),
       contacts_(outline.scene.is_cut(), request_) {
     narrow_.set_parameters(request.parameters);
     const auto all_of = [this](const std::vector<double>& whole, const std::vector<double>& doubles) {
