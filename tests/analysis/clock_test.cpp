@@ -345,6 +345,31 @@ TEST_CASE("an error at a stop is measured there, however many steps lead to it f
     for (const auto& row : test::read_trajectory(folder / "sweep.csv").rows) CHECK(row.back() < 1e-9);
 }
 
+TEST_CASE("means with a clock over parts of periods are those over the time, with a high order") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", kepler(0.6, "points = 8\nclock = \"r^(3/2)\"",
+                                                   "step = 0.1\nuntil = 20\nstop = \"r = 1.5 rising\""));
+    const auto largest_error = [&](const std::string& step) {
+        const test::Finished finished =
+            test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "e=0.6,0.9", "--keep",
+                       "mean(r), mean(3 + 0*x)", "--step", step, "-o", folder / "sweep.csv"});
+        INFO(finished.err);
+        REQUIRE(finished.exit_code == 0);
+        double worst = 0;
+        for (const auto& row : test::read_trajectory(folder / "sweep.csv").rows) {
+            const double e = row[1], u = std::acos(-0.5 / e);  // where r = 1 - e cos u is 1.5
+            const double mean =
+                (u * (1 + e * e / 2) - 2 * e * std::sin(u) + e * e / 4 * std::sin(2 * u)) / (u - e * std::sin(u));
+            worst = std::fmax(worst, std::fabs(row[row.size() - 3] - mean));
+            CHECK(std::fabs(row[row.size() - 2] - 3) < 1e-14);
+        }
+        return worst;
+    };
+    CHECK(largest_error("0.3") < 1e-3);    // 4e-4, of 3 steps and a part; 1.3e-2 by the trapezoidal rule alone
+    CHECK(largest_error("0.1") < 1e-6);    // 1.2e-7; 1.5e-3
+    CHECK(largest_error("0.01") < 1e-12);  // 5e-14; 1.5e-5
+}
+
 TEST_CASE("means over a motion with a clock are those over the time") {
     const test::TemporaryFolder folder;
     const double pi = std::acos(-1);
