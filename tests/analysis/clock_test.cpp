@@ -519,7 +519,8 @@ TEST_CASE("a motion that rounding or the step would throw back where the clock i
 }
 
 TEST_CASE("many small steps on the way to a near passage are not taken for a clock that comes to 0") {
-    // The steps pass 5, then 2, then 1.4 times less of the time at each doubling, until r = 7.07.
+    // From doubling to doubling of 65,536 steps the time passed is 135, 66, 57, 34, and 44 after the passage at r
+    // = 7.07.
     const test::TemporaryFolder folder;
     test::write_text(folder / "scene.toml",
                      "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
