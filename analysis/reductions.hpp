@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // What a sweep keeps of each trajectory instead of its states: the time of the first event, how many there were, the
 // largest, least, mean and last value of a formula. Formulas are looked at after every step, and where a stop ended it;
-// means are taken by the trapezoidal rule, with a clock in its time.
+// means are taken by the trapezoidal rule, with a clock as clocked_mean.hpp says.
 #pragma once
 
 #include <cstdint>

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <utility>
 
 namespace lobatto {
@@ -225,7 +226,8 @@ std::int64_t records_of_call(const Kernel& kernel, const TrajectoryRequest& requ
 class LastOfChain {
 public:
     LastOfChain(const Kernel& kernel, const TrajectoryRequest& request)
-        : request_(request),
+        : kernel_(kernel),
+          request_(request),
           row_(kernel->clocked != 0 && kernel->real_kind == LOBATTO_DOUBLE ? 1 + 2 * request.q.size() : 0) {}
 
     void ask(lobatto_advance& call) { call.chain = row_.empty() ? nullptr : row_.data(); }
@@ -241,26 +243,47 @@ public:
 
 private:
     static constexpr std::int64_t first_look = std::int64_t(1) << 16, long_run = std::int64_t(1) << 18;
-    static constexpr double hopeless = 1e5, shrinks = 0.9, far = 4;
+    static constexpr double hopeless = 1e5, shrinks = 0.9, far = 4, deep = 1e-8;
 
     // A clock that comes to 0 in a finite time lets its steps pass ever less of it. At every doubling of the steps:
     // whether the rest of the way would take more than `hopeless` times as many as the last half of them, or is far
     // more than all that is to come if each doubling passes as much less than the one before as it did three times.
+    // Small steps on the way to a near passage do so too, until they have passed it. So the second holds only where
+    // steps have become `deep` times as short as the first.
     bool stands_still(const TrajectoryResult& result) {
         if (result.chain_steps < next_look_) return false;
         const double end = time_after(request_, request_.steps), passed = std::fabs(row_[0] - time_looked_),
                      left = std::fabs(end - row_[0]), ratio = passed / std::exchange(passed_before_, passed);
         shrunk_ = ratio < shrinks ? shrunk_ + 1 : 0;
         const bool slows_down = next_look_ > long_run && passed < std::fabs(row_[0] - request_.time) / 4,
-                   comes_to_an_end = shrunk_ >= 3 && left > far * passed * ratio / (1 - ratio);
+                   comes_to_an_end = shrunk_ >= 3 && left > far * passed * ratio / (1 - ratio) &&
+                                     passed < deep * first_step() * static_cast<double>(result.chain_steps - looked_);
         time_looked_ = row_[0];
+        looked_ = result.chain_steps;
         next_look_ = 2 * result.chain_steps;
         return comes_to_an_end || (slows_down && left > hopeless * passed);
     }
 
+    // The time that the first step of the chain passes.
+    double first_step() const {
+        LoadedStepper<double> stepper(kernel_);
+        std::vector<double> row(row_.size());
+        lobatto_advance call{};
+        call.steps = 1;
+        call.tolerance = request_.tolerance;
+        call.interval = std::numeric_limits<double>::infinity();
+        call.end = std::nextafter(request_.time, request_.arrivals.end);
+        call.chain = row.data();
+        const bool begins = stepper.prepare(request_.parameters, request_.step) == LOBATTO_OK &&
+                            stepper.start(request_.time, request_.q, request_.p) == LOBATTO_OK;
+        if (begins) stepper.advance(call);  // wherever it arrives: the chain takes its step before
+        return begins && call.chain_steps > 0 ? std::fabs(row[0] - request_.time) : 0;
+    }
+
+    const Kernel& kernel_;
     const TrajectoryRequest& request_;
     std::vector<double> row_;  // t, q, p, of kernels with a clock in double; else empty
-    std::int64_t next_look_ = first_look;
+    std::int64_t next_look_ = first_look, looked_ = 0;
     double time_looked_ = 0, passed_before_ = 0;
     int shrunk_ = 0;
 };

@@ -328,6 +328,48 @@ TEST_CASE("a sweep with a clock compares all that comes before a stop, also wher
     }
 }
 
+TEST_CASE("an error at a stop is measured there, however many steps lead to it from the last comparison") {
+    const test::TemporaryFolder folder;
+    // 76,000 steps before the first comparison, at t = 10: more than one call of a kernel takes.
+    test::write_text(folder / "scene.toml", kepler(0.5, "points = 4\nclock = \"r^(3/2)\"",
+                                                   "step = 0.00005\nuntil = 610\nstop = \"y = -0.5 falling\""));
+    const test::Finished one =
+        test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--every", "10"});
+    INFO(one.out << one.err);
+    CHECK(one.exit_code == 0);
+    CHECK(test::contains(one.out, "of the amplitude at the end"));
+    const test::Finished many =
+        test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "e=0.4,0.5", "-o", folder / "sweep.csv"});
+    INFO(many.err);
+    CHECK(many.exit_code == 0);
+    for (const auto& row : test::read_trajectory(folder / "sweep.csv").rows) CHECK(row.back() < 1e-9);
+}
+
+TEST_CASE("means with a clock over parts of periods are those over the time, with a high order") {
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml", kepler(0.6, "points = 8\nclock = \"r^(3/2)\"",
+                                                   "step = 0.1\nuntil = 20\nstop = \"r = 1.5 rising\""));
+    const auto largest_error = [&](const std::string& step) {
+        const test::Finished finished =
+            test::run({LOBATTO_PROGRAM, "sweep", folder / "scene.toml", "--vary", "e=0.6,0.9", "--keep",
+                       "mean(r), mean(3 + 0*x)", "--step", step, "-o", folder / "sweep.csv"});
+        INFO(finished.err);
+        REQUIRE(finished.exit_code == 0);
+        double worst = 0;
+        for (const auto& row : test::read_trajectory(folder / "sweep.csv").rows) {
+            const double e = row[1], u = std::acos(-0.5 / e);  // where r = 1 - e cos u is 1.5
+            const double mean =
+                (u * (1 + e * e / 2) - 2 * e * std::sin(u) + e * e / 4 * std::sin(2 * u)) / (u - e * std::sin(u));
+            worst = std::fmax(worst, std::fabs(row[row.size() - 3] - mean));
+            CHECK(std::fabs(row[row.size() - 2] - 3) < 1e-14);
+        }
+        return worst;
+    };
+    CHECK(largest_error("0.3") < 1e-3);    // 4e-4, of 3 steps and a part; 1.3e-2 by the trapezoidal rule alone
+    CHECK(largest_error("0.1") < 1e-6);    // 1.2e-7; 1.5e-3
+    CHECK(largest_error("0.01") < 1e-12);  // 5e-14; 1.5e-5
+}
+
 TEST_CASE("means over a motion with a clock are those over the time") {
     const test::TemporaryFolder folder;
     const double pi = std::acos(-1);
@@ -474,6 +516,19 @@ TEST_CASE("a motion that rounding or the step would throw back where the clock i
                                             "b=2,0.5,1.5,0.9", "-o", folder / "table.csv", "--quiet"});
     CHECK(swept.exit_code == 3);
     CHECK(swept.err.find("2 of 4 trajectories failed: 2 t + h equals t or the clock is 0.") != std::string::npos);
+}
+
+TEST_CASE("many small steps on the way to a near passage are not taken for a clock that comes to 0") {
+    // From doubling to doubling of 65,536 steps the time passed is 135, 66, 57, 34, and 44 after the passage at r
+    // = 7.07.
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "scene.toml",
+                     "lagrangian = \"(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)\"\n[coordinates]\n"
+                     "x = { position = -100, velocity = 0.3 }\ny = { position = 14, velocity = 0 }\n[method]\n"
+                     "points = 3\nclock = \"auto\"\n[run]\nstep = 0.003\nuntil = 1000\n[output]\nevery = 500\n");
+    const test::Finished done =
+        test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv", "--quiet", "--unmeasured"});
+    CHECK_MESSAGE(done.exit_code == 0, done.err);
 }
 
 TEST_CASE("a clock that runs away with an escaping motion is told, and one that grows less goes on") {

@@ -6,9 +6,14 @@
 #include <cmath>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "analysis/accuracy/companion/companion.hpp"
+#include "analysis/kernel/kernel_of.hpp"
+#include "analysis/motion.hpp"
+#include "generator/pipeline.hpp"
 #include "tests/analysis/measured_scene.hpp"
 
 using namespace lobatto;
@@ -419,6 +424,44 @@ TEST_CASE("an oscillation that looks constant at the steps is not taken for a co
     // Also where every step of the run is compared: cos is 1 at multiples of half of the step.
     const MeasuredScene few(timed_scene("q'^2/2 - q^2/2 + q*cos(2*pi*20*t)", swinging, "points = 2", 0.1, 5));
     CHECK(few.run({"--beyond-horizon"}).out.find("as large as the motion itself from t = ") != std::string::npos);
+}
+
+TEST_CASE("an error is extrapolated only where the rest of the run is like what was compared") {
+    // Half of the run is compared: the rest is like it, is three times as fast, or loses energy ten times as fast.
+    const auto known_at_end = [](const std::string& lagrangian, const std::string& velocity, const std::string& force) {
+        const Scene scene = read_scene(
+            Source("half.toml", "time = \"t\"\nlagrangian = \"" + lagrangian +
+                                    "\"\n[coordinates]\nx = { position = 1, velocity = " + velocity + " }\n" +
+                                    (force.empty() ? "" : "[forces]\nx = \"" + force + "\"\n") +
+                                    "[method]\npoints = 3\n[run]\nstep = 0.1\nuntil = 40\n[output]\nevery = 10\n"));
+        const Derivation derivation = derive(scene);
+        const Kernel kernel = kernel_of(emit(derivation), Precision::double_);
+        LoadedStepper<double> stepper(kernel);
+        TrajectoryRequest request = request_of(scene, 400, stepper);
+        Companion companion(derivation, kernel, request, kernel->epsilon);
+        int blocks = 0;
+        request.sink = [&](const Records& records) {
+            for (std::int64_t i = 0; i < records.count; ++i) {
+                if (++blocks == 21) companion.compute_here();
+                Records one = records;
+                one.rows += i * records.columns;
+                one.count = 1;
+                companion.observe(one);
+            }
+        };
+        const TrajectoryResult result = integrate(kernel, request);
+        REQUIRE(result.status == LOBATTO_OK);
+        const std::optional<MeasuredError> error = companion.finish(result);
+        REQUIRE(error);
+        CHECK(error->until == doctest::Approx(20).epsilon(0.1));
+        CHECK(!error->complete);
+        CHECK(error->end > 0);
+        return error->is_known_at_end();
+    };
+    CHECK(known_at_end("x'^2/2 - x^2/2", "0", ""));
+    CHECK(known_at_end("x'^2/2 - x^2/2", "0", "-0.01*x'"));
+    CHECK(!known_at_end("x'^2/2 - x^2/2", "0", "-0.15/(1 + exp(25 - t))*x'"));
+    CHECK(!known_at_end("x'^2/2 + 10/((x - 40)^2 + 1)", "1.2", ""));
 }
 
 TEST_CASE("a run that is not measured says nothing of its error") {

@@ -48,6 +48,7 @@ Companion::Companion(const Outline& outline, const Kernel& kernel, const Traject
       narrow_(outline.system),
       constraints_(outline.system),
       parameters_(request.parameters),
+      changes_energy_(!outline.conserves_energy() && kernel->has_energy != 0),
       contacts_(outline.scene.is_cut(), request_) {
     narrow_.set_parameters(request.parameters);
     const auto all_of = [this](const std::vector<double>& whole, const std::vector<double>& doubles) {
@@ -291,7 +292,9 @@ void Companion::compare_at_stop(double longest) {
     if (is_clocked()) {
         place.arrivals = {std::numeric_limits<double>::infinity(), stop_time_.front(), false};
         place.set_step(step_of(segment(0)), request_.whole_parameters);
-        place.advance(1, request_.tolerance);
+        const Stopwatch watch;
+        while (place.advance(1, request_.tolerance) == 0 && place.status == LOBATTO_OK)  // a call takes so many steps
+            if (is_short_of_stop_ = watch.seconds() > longest; is_short_of_stop_) return;
     } else if (way.front() * request_.step > 0) {
         const double wanted = std::ceil(way.front() / request_.step * ratio_of(segment(0)));
         const std::int64_t steps = std::max<std::int64_t>(1, std::llround(wanted));
@@ -300,7 +303,7 @@ void Companion::compare_at_stop(double longest) {
         const bool is_even = pulses_.empty() && knots_.empty() && narrow_.empty() && !contacts_.is_sought();
         const Stopwatch watch;
         for (std::int64_t done = 0; done < steps && place.status == LOBATTO_OK;) {
-            if (watch.seconds() > longest) return;
+            if (is_short_of_stop_ = watch.seconds() > longest; is_short_of_stop_) return;
             if (is_even) {
                 place.set_step(step, request_.whole_parameters);
                 done += place.advance(std::min(steps - done, most_at_once), request_.tolerance);

@@ -119,6 +119,9 @@ private:
     bool is_held(const std::vector<double>& amplitude) const;
     void look_at_paces(std::vector<double>& amplitudes, std::size_t comparisons, const std::vector<double>& of_run,
                        const std::vector<double>& of_companion) const;
+    bool goes_on_alike(std::size_t comparisons, const std::vector<double>& amplitude,
+                       const TrajectoryResult& result) const;
+    double power(const Rows& rows) const;
     MeasuredError compare(const TrajectoryResult& result) const;
     void lose_where_it_began(MeasuredError& error, const std::vector<double>& amplitude, double of_run) const;
 
@@ -137,6 +140,7 @@ private:
     std::vector<double> knots_;     // of measured values in time, at which its steps end
     std::int64_t evaluations_ = 0;  // of terms, along steps of the companion
     bool is_driven_ = false;        // explicit time, without a clock
+    bool changes_energy_;           // as forces and explicit time do
     ShortContacts contacts_;        // which the steps of the run may miss, too
     Range way_;                     // since the last comparison
     std::int64_t stride_;           // steps of the run between comparisons
@@ -144,6 +148,7 @@ private:
     std::vector<Point> run_;         // of the run, at comparisons
     std::vector<double> stop_time_;  // where a stop ended it, as parts; empty: none did
     Point stop_{at_stop, {}};
+    bool is_short_of_stop_ = false;        // to go there took too long
     Range range_;                          // of the run's kept states
     mutable std::mutex mutex_;             // guards what follows
     std::vector<Point> companion_;         // of the companion

@@ -26,6 +26,8 @@ constexpr double exponential = 14, certain = 25;
 constexpr double largest_jump = 0.45;  // of all doublings, from one window to the next
 constexpr int between = 16;            // parts of a step
 constexpr double most_beyond = 8;      // times what was compared: exponential growth might not be seen in it yet
+// Times what was compared: a momentum, or the change of the energy in time, of a rest that is another motion.
+constexpr double much_faster = 1.5, much_more_power = 2;
 
 using ErrorCourse = std::vector<std::pair<double, double>>;  // time, how far the motions are apart
 
@@ -194,6 +196,48 @@ void Companion::lose_where_it_began(MeasuredError& error, const std::vector<doub
     if (lost > 0) lose(error, began[0], {began.begin() + 1, began.end()});
 }
 
+// Whether the run beyond so many comparisons is no faster than before, and does not win or lose energy much faster.
+// Else its error grows otherwise there than it did.
+bool Companion::goes_on_alike(std::size_t comparisons, const std::vector<double>& amplitude,
+                              const TrajectoryResult& result) const {
+    const std::size_t n = groups_.size();
+    Rows until_there, beyond;
+    for (std::size_t j = 0; j <= comparisons; ++j) until_there.push_back(row_at(j));
+    for (std::size_t j = comparisons; j <= run_.size(); ++j) beyond.push_back(row_at(j));
+    std::vector<double> end{result.time};
+    end.insert(end.end(), result.q.begin(), result.q.end());
+    end.insert(end.end(), result.p.begin(), result.p.end());
+    beyond.push_back(end);
+    for (std::size_t i = n; i < 2 * n; ++i) {
+        double most = 0, most_beyond_it = 0;
+        for (std::size_t j = 0; j < comparisons; ++j)
+            for (const auto* range : {&companion_ranges_[j].least, &companion_ranges_[j].most})
+                if (!range->empty()) most = std::fmax(most, std::fabs((*range)[i]));
+        for (const std::vector<double>& row : beyond) most_beyond_it = std::fmax(most_beyond_it, std::fabs(row[1 + i]));
+        if (amplitude[i] > 0 && most_beyond_it > much_faster * most) return false;
+    }
+    return !changes_energy_ || power(beyond) <= much_more_power * power(until_there);
+}
+
+// The most that the energy changes from the first of these states on, in the time between the first and the last.
+double Companion::power(const Rows& rows) const {
+    NumberStepper stepper(kernel_);
+    if (stepper.prepare(request_.whole_parameters, request_.whole_step) != LOBATTO_OK) return 0;
+    const auto n = static_cast<std::ptrdiff_t>(groups_.size());
+    const auto energy_of = [&](const std::vector<double>& row) {
+        const std::vector<double> time = as_parts({row[0]}, parts_),
+                                  q = as_parts({row.begin() + 1, row.begin() + 1 + n}, parts_),
+                                  p = as_parts({row.begin() + 1 + n, row.end()}, parts_);
+        std::vector<double> energy(parts_, 0.0);
+        stepper.energy(time.data(), q.data(), p.data(), energy.data());
+        return energy[0];
+    };
+    const double energy = energy_of(rows.front());
+    double most = 0;
+    for (const std::vector<double>& row : rows) most = std::fmax(most, std::fabs(energy_of(row) - energy));
+    return most / std::fabs(rows.back()[0] - rows.front()[0]);
+}
+
 MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const std::size_t count = std::min(run_.size(), companion_.size());
     const std::vector<double> amplitude = amplitudes(count);
@@ -224,7 +268,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     }
     if (!error.lost_after && count > 0 && is_held(amplitude))
         lose(error, time_of(run_[count - 1]), run_[count - 1].row);
-    error.complete = count == run_.size();
+    error.complete = count == run_.size() && !is_short_of_stop_;
     error.rests = run_rests();
     if (!error.rests) error.doubling = doubling_of(course);  // else what grows are amplitudes, of the companion
     // Errors that grow exponentially do not shrink again: two motions that were out of step have met by chance.
@@ -248,6 +292,7 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
             error.at_end *= std::exp2((whole - part) / *error.doubling);
         else
             error.at_end = whole > most_beyond * part ? std::nan("") : error.at_end * whole * whole / (part * part);
+        if (!goes_on_alike(count, amplitude, result)) error.at_end = std::nan("");
     }
     return error;
 }

@@ -282,7 +282,8 @@ bool EnsembleCompanion::go_to_stop(Known& known, const Records& kept, const Ense
     if (is_clocked) {
         place.arrivals = {std::numeric_limits<double>::infinity(), stop[0], false};
         place.set_step({request_.step / clocked_ratio}, parameters);
-        place.advance(1, request_.tolerance * finer_iteration);
+        while (place.advance(1, request_.tolerance * finer_iteration) == 0 && place.status == LOBATTO_OK) {
+        }  // a call takes so many steps
     } else if (way * request_.step > 0) {
         const double ratio = static_cast<double>(steps_taken(every())) / static_cast<double>(every());
         const std::int64_t taken = std::max<std::int64_t>(1, std::llround(std::ceil(way / request_.step * ratio)));
