@@ -22,6 +22,8 @@ constexpr std::size_t most_judged_states = 64;
 constexpr int frequency_looks = 32;          // at some of them
 constexpr std::size_t frequency_limit = 64;  // coordinates
 constexpr std::size_t force_looks = 6;       // at states
+constexpr int short_steps = 30;              // in the time in which a fast damping ends
+constexpr double notable_kept = 0.02;        // of the amplitude
 // Rounding of forces beside their size that is worth a warning, and beside the measured error.
 constexpr double loud_rounding = 1e-6, seen_by_companions = 10;
 
@@ -85,6 +87,36 @@ std::vector<bool> StepJudge::resting(LoadedStepper<double>& stepper, const Traje
     return rests_beside(stepper, request.step, rows, sizes, slight(sizes));
 }
 
+namespace {
+
+// By how much of their amplitude momenta leave the way of a step when it is taken in short steps: Gauss's steps keep
+// for good what a fast damping takes away at once, and so do all shorter ones that are still long beside it.
+double kept_by_long_step(LoadedStepper<double>& stepper, const TrajectoryRequest& request,
+                         const TrajectoryResult& result, double radians, const std::vector<double>& scale) {
+    const auto after = [&](double step, std::int64_t steps) -> std::vector<double> {
+        lobatto_advance some{};
+        some.steps = steps;
+        if (stepper.prepare(request.parameters, step) != LOBATTO_OK ||
+            stepper.start(result.time, result.q, result.p) != LOBATTO_OK || stepper.advance(some) != LOBATTO_OK)
+            return {};
+        double time{};
+        std::vector<double> q, p;
+        stepper.state(time, q, p);
+        return p;
+    };
+    const std::vector<double> by_one = after(request.step, 1), by_many = after(request.step / radians, short_steps);
+    if (by_one.empty() || by_many.empty()) return 0;
+    const std::size_t n = result.q.size();
+    double largest = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+        const double on_the_way = result.p[k] + short_steps / radians * (by_one[k] - result.p[k]);
+        largest = std::fmax(largest, std::fabs(by_many[k] - on_the_way) / scale[n + k]);
+    }
+    return largest;
+}
+
+}  // namespace
+
 StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request,
                                       const TrajectoryResult& result) const {
     Judgement judgement;
@@ -121,6 +153,10 @@ StepJudge::Judgement StepJudge::judge(const Outline& outline, const Kernel& kern
         look_at(time, within, stepper.momentum(time, within, velocity));
     }
     judgement.limit = stability_limit(outline.quadrature, judgement.radians);
+    if (judgement.radians > short_steps && outline.system.has_forces()) {
+        judgement.kept = kept_by_long_step(stepper, request, result, judgement.radians, scale);
+        if (stepper.prepare(request.parameters, request.step) != LOBATTO_OK) return judgement;
+    }
 
     // Coordinates that rounding alone moves tell nothing, as the radius of a circular orbit.
     std::vector<double> by_constraints;
@@ -170,6 +206,12 @@ std::vector<std::string> StepJudge::warnings(const Judgement& judgement, double 
             "the step is beyond the linear stability limit: h omega = {:.4g} is more than {:.4g}, omega the largest "
             "frequency met. Take a step below {:.2g} times this one, or Gauss, which has no limit",
             judgement.radians, judgement.limit, part_below(judgement.limit, judgement.radians)));
+    else if (judgement.kept > notable_kept)
+        texts.push_back(fmt::format(
+            "a damping is far faster than the step (h omega = {:.3g}), and these steps do not see it: velocities keep "
+            "what they had at the start, {:.2g} of their amplitude at the end. Start with velocities to which the "
+            "damping leads, or leave the small mass or inductance out",
+            judgement.radians, judgement.kept));
     if (judgement.unresolved)
         texts.push_back(fmt::format(
             "in step {}, from t = {:.6g} on, the motion is not resolved: shorter steps lead to another place, or the "

@@ -28,6 +28,7 @@ public:
 
     struct Judgement {
         double radians = 0;  // h times the largest frequency met; 0: not looked for
+        double kept = 0;     // what long steps keep of velocities that a fast damping takes, of their amplitude
         double limit = 0;    // of that, by linear stability; infinite when it lies above, and for Gauss
         struct Unresolved {
             std::int64_t step;  // the first is 1

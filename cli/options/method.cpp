@@ -41,7 +41,11 @@ void MethodOption::add_to(Command& command) {
         });
     command.option("--clock", clock, "Equal steps, or those of the clock that follows from the Lagrangian")
         .shown_as("CLOCK")
-        .one_of(std::vector<std::string>{"none", "auto"});
+        .checked_by([](const std::string& text) {
+            return text == "none" || text == "auto"
+                       ? std::string()
+                       : "it is none or auto; a formula stands in the scene, under [method]: clock = \"" + text + "\"";
+        });
 }
 
 }  // namespace lobatto

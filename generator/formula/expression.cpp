@@ -62,8 +62,8 @@ public:
         if (!is_a<numeric>(value))
             fail(formula.at, frame,
                  fmt::format("{} must be known when the kernel is written: numbers, indices and parameters declared "
-                             "constant, such as n = {{ value = 8, constant = true }}",
-                             what));
+                             "constant, such as n = {{ value = 8, constant = true }}{}",
+                             what, what.starts_with("what mod") ? mod_advice : ""));
         const numeric number = ex_to<numeric>(value);
         if (!number.is_integer())
             fail(formula.at, frame, fmt::format("{} must be a whole number, not {:.6g}", what, number.to_double()));
@@ -72,6 +72,8 @@ public:
     }
 
 private:
+    static constexpr const char* mod_advice =
+        ". For what repeats in time write sin(2*pi*t/T), for a square wave sign(sin(2*pi*t/T))";
     static constexpr int deepest = 1000;            // nodes in nodes, those of definitions too
     static constexpr long largest = 1'000'000'000;  // subscript or bound
 

@@ -203,7 +203,13 @@ void SystemReader::require_velocities() const {
     if (entry == nullptr) return;
     const GiNaC::exset symbols = symbols_of(scene_.lagrangian);
     for (const Coordinate& coordinate : scene_.coordinates)
-        if (symbols.count(coordinate.velocity) == 0)
+        if (symbols.count(coordinate.velocity) == 0) {
+            for (const Constraint& constraint : scene_.constraints)
+                if (constraint.value.has(coordinate.position) && !constraint.solved_for)
+                    fail(constraint.at,
+                         fmt::format("the Lagrangian is degenerate: the velocity {0}' of coordinate {0} does not occur "
+                                     "in it; write this constraint as {0} = ..., then {0} follows from the others",
+                                     coordinate.written));
             fail(entry->value.at,
                  fmt::format("the Lagrangian is degenerate: the velocity {0}' of coordinate {0} does not occur in it; "
                              "add the kinetic energy of {0}, or remove the coordinate; if {0} is a multiplier, write "
@@ -214,6 +220,7 @@ void SystemReader::require_velocities() const {
                                  ? ""
                                  : ". Equations would give it some, but not all are eliminated. " +
                                        scene_.not_eliminated.front()));
+        }
 }
 
 // Those values that the Lagrangian and the forces asked for.

@@ -41,7 +41,7 @@ Reason accumulating(const std::string& smaller) {
         "by friction, which is not computed; the wall's formula jumps; a reset leaves the motion on its way "
         "through the wall; or the step is too long for a switch",
         "rest = 0.01 in the line of the wall, which ends the run at an impact as slow as this, an earlier "
-        "end, tanh(v/w) in place of sign(v) in a friction, or " +
+        "end, stop = \"x' = 0\" where friction ends a motion, tanh(v/w) in place of sign(v), or " +
             smaller + " where many impacts belong into a step"};
 }
 

@@ -89,6 +89,22 @@ TEST_CASE("a Lagrangian or a momentum that jumps at a velocity has no motion the
     }
 }
 
+TEST_CASE("a damping that Gauss's steps do not see is told, not where the start fits it") {
+    const auto charging = [](const std::string& stages, const std::string& current) {
+        return run(
+            "lagrangian = \"L*q'^2/2 - q^2/(2*C) + q*V\"\n[coordinates]\nq = { position = 0, velocity = \"" + current +
+            "\" }\n[forces]\nq = \"-R*q'\"\n[parameters]\nL = 1e-8\nC = 1e-6\nR = 1000\nV = 5\n[method]\nfamily = "
+            "\"gauss\"\nstages = " +
+            stages + "\n[run]\nstep = 2e-5\nuntil = 4e-3\n");
+    };
+    for (const std::string stages : {"2", "4"}) {
+        CHECK(charging(stages, "0").err.find("velocities keep what they had at the start") != std::string::npos);
+        const test::Finished fits = charging(stages, "V/R");
+        CHECK(fits.exit_code == 0);
+        CHECK(fits.err == "");
+    }
+}
+
 TEST_CASE("a momentum that is a difference at rest has its velocity where the motion turns") {
     for (const std::string lagrangian : {"exp(x') - x' - x^2/2", "1/(2 - x') - x'/4 - x^2/8"}) {
         CAPTURE(lagrangian);

@@ -47,6 +47,15 @@ TEST_CASE("sections, functions and signs of other languages are told ours") {
     CHECK(test::contains(function("diff(x, t)"), "The velocity of x is written x'."));
     CHECK(test::contains(function("|x|"), "unexpected character '|' in the Lagrangian: write abs(...)"));
     CHECK(test::contains(function("\\\\frac{1}{2}*x"), "formulas are no LaTeX"));
+    CHECK(test::contains(function("if(x > 0 && x < 1, x, 0)"), "there is no 'and' in formulas"));
+    CHECK(test::contains(told(oscillator("x'^2/2 - x*mod(t, 1)", "step = 0.1", "", "time = \"t\"\n")),
+                         "for a square wave sign(sin(2*pi*t/T))"));
+    CHECK(test::contains(told(oscillator("x'^2/2 - x^2/2", "step = 0.1"), 2, {"--clock", "r^2"}),
+                         "a formula stands in the scene, under [method]: clock = \"r^2\""));
+    CHECK(test::contains(told("lagrangian = \"x'^2/2 - y^2/2\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+                              "y = { position = -1, velocity = 0 }\n[constraints]\nnode = \"x + y = 0\"\n[run]\nstep = "
+                              "0.1\nuntil = 1\n"),
+                         "write this constraint as y = ..., then y follows from the others"));
     const auto scene = [](const std::string& section) {
         return told(oscillator("x'^2/2 - x^2/2", "step = 0.1", section + "\nk = 1\n"));
     };

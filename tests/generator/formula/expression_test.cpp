@@ -230,7 +230,9 @@ TEST_CASE("characters of word processors come with what to type instead") {
     check_error(
         "0,5", 2,
         "unexpected character ',' in the Lagrangian: decimals have a point, and functions have no more arguments");
-    check_error("q & m", 3, "unexpected character '&' in the Lagrangian");
+    check_error(
+        "q & m", 3,
+        "unexpected character '&' in the Lagrangian: there is no 'and' in formulas: write one if inside another");
     CHECK(error_of("é + \x1b[31m") == layout("é + \uFFFD[31m", 1, "unexpected character 'é' in the Lagrangian"));
     CHECK(error_of("\xff") == layout("\uFFFD", 1, "unexpected character '\uFFFD' in the Lagrangian"));
 }
