@@ -157,7 +157,8 @@ void SystemReader::read_definitions() {
             parse_subject(source_, keys_.emplace_back(text_of_key(entry)), {&names_, "[definitions]", true, {}});
         if (subject.subscripted && subject.indices.empty())
             fail(subject.subscript.at.at,
-                 "the indices of a definition are names without another meaning, as in \"r[i,j]\"");
+                 "the indices of a definition are names without another meaning, as in \"r[i,j]\"; single ones are "
+                 "definitions of their own, such as r1 and r2");
         const std::string name(subject.name.text);
         declarations_.declare(name, subject.name.at, "definition");
         const auto definition = std::make_shared<Definition>();

@@ -565,9 +565,11 @@ TEST_CASE("a definition is its formula wherever its name stands, and its prime i
     CHECK(error("y*q'", "\"y[i]\" = \"i\"\n") == at + "2:15: the definition y has indices: write y[i]");
     CHECK(error("y[1]*q'", "y = 2\n") == at + "2:16: y is a definition, not an array: write y without brackets");
     CHECK(error("y*q'", "\"y[1]\" = 2\n") ==
-          at + "12:4: the indices of a definition are names without another meaning, as in \"r[i,j]\"");
+          at + "12:4: the indices of a definition are names without another meaning, as in \"r[i,j]\"; single ones are "
+               "definitions of their own, such as r1 and r2");
     CHECK(error("y*q'", "\"y[a]\" = 2\n") ==
-          at + "12:4: the indices of a definition are names without another meaning, as in \"r[i,j]\"");
+          at + "12:4: the indices of a definition are names without another meaning, as in \"r[i,j]\"; single ones are "
+               "definitions of their own, such as r1 and r2");
     CHECK(error("y*q'", "\"y + 1\" = 2\n") ==
           at + "12:4: '+' is too much here: a line of [definitions] begins with x = or \"x[i]\" =");
     CHECK(error("q'", "y[i] = 2\n") ==
