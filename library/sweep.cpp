@@ -33,10 +33,15 @@ constexpr double most_memory = 4e9;  // bytes of kept states
 constexpr int most_threads = 1024;
 
 // A name has one value or many.
-void refuse_both(const Settings& settings, const SweepStarts& starts) {
+void refuse_both(const lobatto::Scene& scene, const Settings& settings, const SweepStarts& starts) {
+    // Of the scene, x_1 as x[1]: the study has read all names that are set.
+    const auto of = [&](std::string name) {
+        std::erase(name, ' ');
+        return varied_name(scene, name, "name", [](const std::string& message) { throw lobatto::InputError(message); });
+    };
     for (const SweepStarts::Column& varied : starts.columns())
         for (const auto& [name, value] : settings.set)
-            if (name == varied.of.name)
+            if (const VariedName set = of(name); set.role == varied.of.role && set.index == varied.of.index)
                 throw lobatto::InputError(
                     fmt::format("--set: '{}' is varied too; leave one of both out", varied.of.name));
     using Role = VariedName::Role;
@@ -125,7 +130,7 @@ OpenedSweep open_sweep(const Scene& scene, const StartsRequest& starts, const Sw
         wish.measures = options.measure;
         wish.beyond_horizon = options.beyond_horizon;
         OpenedSweep made(new SweepStudy(std::move(read), starts, wish, algebra()));
-        refuse_both(options, made->starts());
+        refuse_both(made->scene(), options, made->starts());
         return made;
     });
     guarded([&] {

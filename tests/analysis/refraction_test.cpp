@@ -143,6 +143,64 @@ TEST_CASE("refraction of moving steps, of fast particles, with constraints and w
     CHECK(is_checked);
 }
 
+TEST_CASE("switches that vanish along one surface change together: no layer between them throws the motion back") {
+    const auto end = [](const std::string& lagrangian, const std::string& start, double until) {
+        return run(scene_of(lagrangian, start, until, "", 0.1)).q[0];
+    };
+    const std::string fast = "x = { position = -1, velocity = 2 }\n";
+    CHECK(std::fabs(end("x'^2/2 - if(x > 0, 10, 0) - if(x < 0, 10, 0)", fast, 2) - 3) < 1e-13);
+    CHECK(std::fabs(end("x'^2/2 - 5*sign(x) + 5*sign(x^3 + x)", fast, 2) - 3) < 1e-13);
+    const std::string enters = "x = { position = -1, velocity = \"sqrt(6)\" }\n";
+    CHECK(std::fabs(end("x'^2/2 - if(x > 1, 2.2, 0) - if(x > 0, if(x < 1, 2, 0), 0)", enters, 2) -
+                    end("x'^2/2 - if(x > 0, if(x < 1, 2, 2.2), 0)", enters, 2)) < 1e-13);
+    const std::string ray = "y = { position = 0.5, velocity = 0.7 }\n";
+    CHECK(std::fabs(
+              end("(1 + if(y > 0, if(y < 1, 0.5, 0), 0) + if(y > 1, if(y < 2, 0.3, 0), 0))*sqrt(1 + y'^2)", ray, 1.5) -
+              end("if(y > 1, if(y > 2, 1, 1.3), if(y > 0, 1.5, 1))*sqrt(1 + y'^2)", ray, 1.5)) < 1e-13);
+}
+
+TEST_CASE("a start elsewhere is on the sides of all switches there, of those within others too") {
+    const auto slab = [](double x, double velocity) {
+        return run(scene_of("x'^2/2 - if(abs(x) < 1, -0.1, 0)",
+                            fmt::format("x = {{ position = {}, velocity = {} }}\n", x, velocity), 1.95, "", 0.13));
+    };
+    const Kernel kernel = kernel_of(emit(derive(scene_of("x'^2/2 - if(abs(x) < 1, -0.1, 0)",
+                                                         "x = { position = -2, velocity = 1 }\n", 1.95, "", 0.13))),
+                                    Precision::double_);
+    for (const auto& [x, velocity] : {std::pair{3.0, 1.0}, {2.0, -1.0}, {0.5, 1.0}, {-3.0, -1.0}}) {
+        const Scene scene =
+            scene_of("x'^2/2 - if(abs(x) < 1, -0.1, 0)", "x = { position = -2, velocity = 1 }\n", 1.95, "", 0.13);
+        LoadedStepper<double> stepper(kernel);
+        TrajectoryRequest request = request_of(scene, steps_of(scene, {}).count, stepper);
+        request.q = {x};
+        request.p = {velocity};
+        const TrajectoryResult result = integrate(kernel, request), exact = slab(x, velocity);
+        CHECK(result.q[0] == doctest::Approx(exact.q[0]).epsilon(1e-13));
+        CHECK(result.p[0] == doctest::Approx(exact.p[0]).epsilon(1e-13));
+    }
+}
+
+TEST_CASE("a state kept right at a step, or at a stop there, is the one before it, and so is its energy") {
+    for (const std::string start : {"-0.7", "-1", "-0.9", "-0.35"}) {
+        const test::TemporaryFolder folder;
+        test::write_text(folder / "step.toml",
+                         "lagrangian = \"x'^2/2 - if(x > 0, 5, 0)\"\n[coordinates]\nx = { position = " + start +
+                             ", velocity = 1 }\n[run]\nstep = 0.05\nuntil = 3\n");
+        const test::Finished done = test::run({LOBATTO_PROGRAM, "run", folder / "step.toml", "-o", folder / "a.csv"});
+        CHECK_MESSAGE(done.exit_code == 0, done.err);
+        for (const auto& row : test::read_trajectory(folder / "a.csv").rows) CHECK(std::fabs(row[3] - 0.5) < 1e-13);
+    }
+    const test::TemporaryFolder folder;
+    test::write_text(folder / "stop.toml",
+                     "lagrangian = \"x'^2/2 - if(x > 1, 0.3, 0)\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n"
+                     "[run]\nstep = 0.13\nuntil = 3\nstop = \"x = 1\"\n");
+    const test::Finished done = test::run({LOBATTO_PROGRAM, "run", folder / "stop.toml", "-o", folder / "a.csv"});
+    CHECK_MESSAGE(done.exit_code == 0, done.err);
+    const std::vector<double> last = test::read_trajectory(folder / "a.csv").rows.back();
+    CHECK(std::fabs(last[2] - 1) < 1e-13);
+    CHECK(std::fabs(last[3] - 0.5) < 1e-13);
+}
+
 TEST_CASE("pieces that meet change no momentum, whatever rounding says of their values") {
     const std::string start = "x = { position = 1, velocity = 0 }\n";
     const TrajectoryResult by_if = run(scene_of("x'^2/2 - if(x > 0.3, x^2, 4*x^2 - 0.27) + 1e6", start, 40, "", 0.05)),

@@ -183,7 +183,7 @@ TEST_CASE("any other Lagrangian shows its momenta, forces, second derivatives an
     }
 }
 
-TEST_CASE("derive begins with the equations of motion, as worked out by hand") {
+TEST_CASE("what derive says of the system begins with its equations of motion, as worked out by hand") {
     const auto text = [](const std::string& scene) { return text_of(description_of(scene)); };
     const auto holds = [](const std::string& text, const std::string& line) {
         INFO(text);

@@ -21,6 +21,49 @@ constexpr bool has_refractions() {
         return false;
 }
 
+// A place u(t, q) = 0 at which L may jump, near a state.
+template <class K>
+struct Surface {
+    using real = typename K::real;
+    static constexpr int n = K::coordinates;
+    real slopes[K::refractions * n]{}, rates[K::refractions]{}, rate{};
+    const real* slope{};  // du/dq; the rate is du/dt at fixed q
+
+    Surface(const WatchedStepper<K>& stepper, int number, real time, const real* q) {
+        if constexpr (K::autonomous)
+            K::refraction(stepper.coefficients, q, +slopes, +rates);
+        else
+            K::refraction(stepper.coefficients, time, q, +slopes, +rates);
+        slope = slopes + K::refraction_of[number] * n;
+        rate = rates[K::refraction_of[number]];
+    }
+    Surface(const Surface&) = delete;
+
+    real speed(const real* velocity) const {  // du/dt along the motion
+        real sum = rate;
+        for (int c = 0; c < n; ++c) sum += slope[c] * velocity[c];
+        return sum;
+    }
+    // What a rounding of the time and of positions, or of their ways in a step, does to u.
+    real rounding(real time, const real* q, const real* velocity, real step) const {
+        real sum = fabs(rate) * (fabs(time) > fabs(step) ? fabs(time) : fabs(step));
+        for (int c = 0; c < n; ++c) {
+            const real way = fabs(velocity[c] * step);
+            sum += fabs(slope[c]) * (fabs(q[c]) > way ? fabs(q[c]) : way);
+        }
+        return real(64) * Limits<real>::epsilon * sum;
+    }
+    bool is_parallel_to(const Surface& other) const {
+        real own = rate * rate, others = other.rate * other.rate, both = rate * other.rate;
+        for (int c = 0; c < n; ++c) {
+            own += slope[c] * slope[c];
+            others += other.slope[c] * other.slope[c];
+            both += slope[c] * other.slope[c];
+        }
+        return fabs(own * others - both * both) <= Limits<real>::root_epsilon * own * others;
+    }
+};
+
 // Of a state that lies on a switch, before the side changes.
 template <class K>
 class Refraction {
@@ -29,15 +72,14 @@ public:
     using S = WatchedStepper<K>;
     static constexpr int n = K::coordinates;
 
-    Refraction(S& at, int number, real t, const real* position, const real* momentum)
-        : stepper(at), side(at.side(number)), time(t), q(position), p(momentum) {
-        if constexpr (K::autonomous)
-            K::refraction(stepper.coefficients, q, +slopes, +rates);
-        else
-            K::refraction(stepper.coefficients, time, q, +slopes, +rates);
-        slope = slopes + K::refraction_of[number] * n;
-        rate = rates[K::refraction_of[number]];
+    // `value`, `slack`: of all switches there. Those that vanish along the same surface change together.
+    Refraction(S& at, int number, real t, const real* position, const real* momentum, const real* value,
+               const real* slack)
+        : stepper(at), surface(at, number, t, position), side(at.side(number)), time(t), q(position), p(momentum) {
         before = stepper.energy(time, q, p, &energy);
+        for (int i = 0; i < switches_of<K>(); ++i)
+            changes[i] = i == number || (K::refraction_of[i] >= 0 && fabs(value[i]) <= slack[i] &&
+                                         surface.is_parallel_to(Surface<K>(at, i, t, position)));
     }
 
     // The momentum after it, and the side where the motion goes on.
@@ -46,8 +88,8 @@ public:
         if (before != Status::ok || !is_finite(energy)) return Status::not_finite;
         real normal = real(0), square = real(0);
         for (int c = 0; c < n; ++c) {
-            normal += p[c] * slope[c];
-            square += slope[c] * slope[c];
+            normal += p[c] * surface.slope[c];
+            square += surface.slope[c] * surface.slope[c];
         }
         least = fabs(normal) > real(0) ? fabs(normal) / square * Limits<real>::root_epsilon : Limits<real>::epsilon;
         Trial trial = at(real(0));
@@ -81,14 +123,13 @@ private:
     Trial at(real mu) {
         Trial trial;
         trial.mu = mu;
-        for (int c = 0; c < n; ++c) trial.p[c] = p[c] + mu * slope[c];
+        for (int c = 0; c < n; ++c) trial.p[c] = p[c] + mu * surface.slope[c];
         real here{};
         Status status = stepper.velocity(time, q, trial.p, trial.velocity);
         if (constraints_of<K>() > 0 && status == Status::ok) stepper.momentum(time, q, trial.velocity, trial.p);
         if (status == Status::ok) status = stepper.energy(time, q, trial.p, &here);
-        trial.excess = here - energy + mu * rate;
-        trial.speed = rate;
-        for (int c = 0; c < n; ++c) trial.speed += slope[c] * trial.velocity[c];
+        trial.excess = here - energy + mu * surface.rate;
+        trial.speed = surface.speed(trial.velocity);
         trial.is_known = status == Status::ok && is_finite(trial.excess) && is_finite(trial.speed);
         return trial;
     }
@@ -141,15 +182,18 @@ private:
     }
 
     void change_side() {
-        side = -side;
+        for (int i = 0; i < switches_of<K>(); ++i)
+            if (changes[i]) stepper.side(i) = -stepper.side(i);
         K::prepare(stepper.parameters, stepper.step_size, stepper.coefficients);
     }
 
     S& stepper;
-    real& side;
+    const Surface<K> surface;
+    const real side;
+    bool changes[switches_of<K>()]{};
     real time;
-    const real *q, *p, *slope{};
-    real slopes[K::refractions * n]{}, rates[K::refractions]{}, rate{}, energy{}, size{}, least{};
+    const real *q, *p;
+    real energy{}, size{}, least{};
     Status before{};
 };
 

@@ -7,6 +7,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "refraction.hpp"
 #include "walls.hpp"
 
 namespace lobatto {
@@ -18,15 +19,30 @@ struct Sides {
     using S = WatchedStepper<K>;
     static constexpr int n = K::coordinates;
 
-    // Of each switch where a state is.
+    // Of each switch where a state is; at a place where L jumps, the one from which the motion comes. A switch may hold
+    // the sides of those before it.
     static void take_at(S& stepper, real time, const real* q, const real* velocity) {
-        if constexpr (switches_of<K>() > 0) {
+        for (int tries = 0; tries <= switches_of<K>(); ++tries) {
+            bool changes = tries == 0;
             real values[K::events];
             Formulas<K>::event(stepper.coefficients, time, q, velocity, values);
-            for (int i = 0; i < switches_of<K>(); ++i)
-                stepper.side(i) = values[K::events - switches_of<K>() + i] > real(0) ? real(1) : real(-1);
+            for (int i = 0; i < switches_of<K>(); ++i) {
+                real value = values[K::events - switches_of<K>() + i];
+                if constexpr (has_refractions<K>()) value = where_it_comes_from(stepper, i, value, time, q, velocity);
+                const real side = value > real(0) ? real(1) : real(-1);
+                changes = changes || side != stepper.side(i);
+                stepper.side(i) = side;
+            }
+            if (!changes) return;
             stepper.prepare(stepper.parameters, stepper.step_size);
         }
+    }
+    static real where_it_comes_from(const S& stepper, int number, real u, real time, const real* q,
+                                    const real* velocity) {
+        if (K::refraction_of[number] < 0) return u;
+        const Surface<K> surface(stepper, number, time, q);
+        const real speed = surface.speed(velocity);
+        return fabs(u) <= surface.rounding(time, q, velocity, stepper.step_size) && speed != real(0) ? -speed : u;
     }
     // The velocity is that of the sides so far.
     static void take(S& stepper, real time, const real* q, const real* p) {

@@ -114,10 +114,14 @@ private:
             }
             status = events.find(*step, first_wall, K::events, real(1));
             if (status != Status::ok) break;
-            const bool is_hit = events.found > 0;
-            const real theta = is_hit ? events.thetas[0] : real(1);
-            const int number = is_hit ? events.numbers[0] : -1;
-            const Cut cut = !is_hit ? Cut::none : throws(stepper, number - first_wall) ? Cut::impact : Cut::passage;
+            const int number = events.found > 0 ? events.numbers[0] : -1;
+            const real theta = events.found > 0 ? events.thetas[0] : real(1),
+                       left_over = end - Between<K>::time(*step, theta);
+            const bool is_late = !(left_over * stepper.step_size > real(0)) || end - left_over == end;
+            const bool is_hit = number >= 0 && !(is_late && changes_state(number - first_wall));
+            const Cut cut = !is_hit                                                                 ? Cut::none
+                            : throws(stepper, number - first_wall) || refracts(number - first_wall) ? Cut::impact
+                                                                                                    : Cut::passage;
             if (rows != nullptr) {
                 status = find(*step, theta, cut, rows, count);
                 if (status != Status::ok) break;
@@ -176,6 +180,13 @@ private:
         }
     };
 
+    // Whether L may jump at wall w, a switch.
+    static bool refracts(int w) {
+        if constexpr (has_refractions<K>()) return w >= impacts_of<K>() && K::refraction_of[w - impacts_of<K>()] >= 0;
+        return false;
+    }
+    // At kicks and refractions: a state right there is the one before, so that the next step begins with them.
+    static bool changes_state(int w) { return Walls<K>::passes(w) || refracts(w); }
     // Whether the state jumps at wall w.
     static bool throws(S& stepper, int w) {
         return w < impacts_of<K>() && (!Walls<K>::passes(w) || Walls<K>::acts(w, Walls<K>::side(stepper, w)));
@@ -196,8 +207,9 @@ private:
         if constexpr (has_refractions<K>()) {
             if (K::refraction_of[number_of_switch] >= 0) {
                 real momentum[n];
-                const Status status =
-                    Refraction<K>(stepper, number_of_switch, wall.time, wall.q, wall.p).pass(momentum);
+                Refraction<K> refraction(stepper, number_of_switch, wall.time, wall.q, wall.p,
+                                         wall.value + first_wall + impacts_of<K>(), wall.slack + impacts_of<K>());
+                const Status status = refraction.pass(momentum);
                 return status == Status::ok ? wall.look(stepper, wall.time, wall.q, momentum) : status;
             }
         }

@@ -380,6 +380,7 @@ TEST_CASE("wrong values to vary are refused with exit code 2, and no table is ma
     CHECK(refusal({}) ==
           "nothing is varied: give --vary NAME=FROM:TO:COUNT, --starts FILE, or --random COUNT with --draw\n");
     CHECK(test::contains(refusal({"--vary", "q=1", "--set", "omgea=2"}), "--set:1:1: unknown parameter 'omgea'"));
+    CHECK(test::contains(refusal({"--vary", "q=1", "--set", "q =2"}), "'q' is varied too; leave one of both out"));
 }
 
 TEST_CASE("trajectories that fail are listed, the others are in the table, the exit code is 3") {
