@@ -92,8 +92,6 @@ TEST_CASE("a ray in two layers keeps n cos of its angle to them, or is reflected
     for (const double angle : {0.5, 0.7, 1.0, 1.4})
         for (const auto& [n1, n2] : {std::pair{1.5, 1.0}, {1.0, 1.5}, {1.0, 3.0}}) {
             CAPTURE(angle);
-            CAPTURE(n1);
-            CAPTURE(n2);
             const TrajectoryResult ray = run(
                 scene_of(fmt::format("if(y > 0, {}, {})*sqrt(1 + y'^2)", n2, n1),
                          fmt::format("y = {{ position = -1, velocity = {:.17g} }}\n", std::tan(angle)), 6, "", 0.05));
@@ -106,7 +104,6 @@ TEST_CASE("a ray in two layers keeps n cos of its angle to them, or is reflected
 TEST_CASE("refraction of moving steps, of fast particles, with constraints and with coupled masses") {
     // A step that moves with the speed w: in its frame as one at rest.
     for (const auto& [U, w] : {std::pair{0.1, 0.3}, {2.0, 0.3}, {-0.1, -0.4}, {0.6, -0.4}}) {
-        CAPTURE(U);
         const TrajectoryResult result = run(scene_of(fmt::format("x'^2/2 - if(x > 1 + {}*t, {}, 0)", w, U),
                                                      "x = { position = 0, velocity = 1 }\n", 4, "", 0.1));
         const double u = 1 - w, left = u * u - 2 * U, met = 1 / u, after = w + (left > 0 ? std::sqrt(left) : -u);
