@@ -14,6 +14,7 @@
 #include "generator/programs/programs.hpp"
 #include "runtime/run/trajectory.hpp"
 #include "tests/support.hpp"
+#include "tests/trajectory_table.hpp"
 
 using namespace lobatto;
 

@@ -72,7 +72,6 @@ TEST_CASE("a Lagrangian or a momentum that jumps at a velocity has no motion the
          {std::pair<std::string, std::string>{"if(abs(x') < 1, x'^2/2, x'^2/10 + 0.4) + x", "the momentum of x jumps"},
           {"x'^2/2 + 0.3*if(x' > 0, 1, 0) - x^2/2",
            "the Lagrangian jumps, by about 0.3, where if in the Lagrangian"}}) {
-        CAPTURE(lagrangian);
         CHECK(run(jumping(lagrangian)).err.find(what) != std::string::npos);
         const test::TemporaryFolder folder;
         test::write_text(folder / "scene.toml", jumping(lagrangian));
