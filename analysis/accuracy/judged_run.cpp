@@ -21,6 +21,7 @@ namespace {
 
 // Energy errors, relative, that are larger than the errors of positions by so much tell that those have grown since.
 constexpr double told_by_energy = 100;
+constexpr double notable_jump = 1e-12;  // of the Lagrangian
 
 // Of a motion that may come near a pole.
 std::string clock_advice(const Scene& scene) {
@@ -187,6 +188,29 @@ std::vector<std::string> degrees_in_sines(const Scene& scene) {
     return texts;
 }
 
+// A state right at a jump of L is one on the side from which the motion comes.
+std::vector<std::string> starts_at_jumps(const Scene& scene) {
+    std::vector<std::string> texts;
+    GiNaC::exmap start{{scene.time, 0}};
+    for (std::size_t k = 0; k < scene.coordinates.size(); ++k) {
+        start[scene.coordinates[k].position] = scene.initial_position[k];
+        start[scene.coordinates[k].velocity] = scene.start == Start::velocity ? scene.initial_rate[k] : GiNaC::ex(0);
+    }
+    const auto at_start = [&](const GiNaC::ex& formula, const std::string& what) {
+        return std::fabs(scene.evaluate(scene.along_motion(formula).subs(start), what).to_double());
+    };
+    for (const Switch& one : scene.switches) {
+        if (!one.refracts || at_start(one.value, one.text) > 0) continue;
+        const GiNaC::ex above = scene.lagrangian.subs(one.side == 1), below = scene.lagrangian.subs(one.side == -1);
+        if (at_start(above - below, one.text) > notable_jump * at_start(above, one.text))
+            texts.push_back(fmt::format(
+                "the start lies right where the Lagrangian jumps, at {} (line {} column {}), and counts as a state on "
+                "the side from which the motion comes; start a little beside it if you mean the other side",
+                one.text, one.at.line, one.at.column));
+    }
+    return texts;
+}
+
 // A kinetic energy that is not positive is allowed. With constant masses it is mostly a sign that was mistaken; others
 // are metrics such as those of relativity.
 std::vector<std::string> negative_masses(const PreparedRun& run, const TrajectoryRequest& request) {
@@ -262,6 +286,7 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
             verdict.warnings.push_back(warning);
     if (const std::string text = observers.walls.text(); !text.empty()) verdict.warnings.push_back(text);
     for (const std::string& jump : jumps) verdict.warnings.push_back(jump);
+    for (const std::string& text : starts_at_jumps(scene)) verdict.warnings.push_back(text);
     for (const std::string& text : degrees_in_sines(scene)) verdict.warnings.push_back(text);
     for (const std::string& text : negative_masses(run, request)) verdict.warnings.push_back(text);
     verdict.failure = failure_of(run, request, result, observers, departure);

@@ -151,6 +151,8 @@ TEST_CASE("switches that vanish along one surface change together: no layer betw
     const std::string enters = "x = { position = -1, velocity = \"sqrt(6)\" }\n";
     CHECK(std::fabs(end("x'^2/2 - if(x > 1, 2.2, 0) - if(x > 0, if(x < 1, 2, 0), 0)", enters, 2) -
                     end("x'^2/2 - if(x > 0, if(x < 1, 2, 2.2), 0)", enters, 2)) < 1e-13);
+    // A surface that is only touched there: x^2 = 0 and x = 0.
+    CHECK(std::fabs(end("x'^2/2 - if(x > 0, 1, 0) - if(x^2 > 0, 3, 0)", fast, 2) - 1.4142135623730951 * 1.5) < 1e-12);
     const std::string ray = "y = { position = 0.5, velocity = 0.7 }\n";
     CHECK(std::fabs(
               end("(1 + if(y > 0, if(y < 1, 0.5, 0), 0) + if(y > 1, if(y < 2, 0.3, 0), 0))*sqrt(1 + y'^2)", ray, 1.5) -
@@ -189,6 +191,14 @@ TEST_CASE("a state kept right at a step, or at a stop there, is the one before i
         for (const auto& row : test::read_trajectory(folder / "a.csv").rows) CHECK(std::fabs(row[3] - 0.5) < 1e-13);
     }
     const test::TemporaryFolder folder;
+    test::write_text(folder / "start.toml",
+                     "lagrangian = \"x'^2/2 - if(x > 0, 5, 0)\"\n[coordinates]\n"
+                     "x = { position = 0, velocity = 1 }\n[run]\nstep = 0.05\nuntil = 1\n");
+    const test::Finished begun = test::run({LOBATTO_PROGRAM, "run", folder / "start.toml", "-o", folder / "a.csv"});
+    CHECK(begun.exit_code == 0);
+    CHECK(begun.err.find("the start lies right where the Lagrangian jumps, at if in the Lagrangian (line 1") !=
+          std::string::npos);
+    CHECK(std::fabs(test::read_trajectory(folder / "a.csv").rows.back()[1] + 1) < 1e-13);  // thrown back
     test::write_text(folder / "stop.toml",
                      "lagrangian = \"x'^2/2 - if(x > 1, 0.3, 0)\"\n[coordinates]\nx = { position = 0, velocity = 1 }\n"
                      "[run]\nstep = 0.13\nuntil = 3\nstop = \"x = 1\"\n");

@@ -77,9 +77,11 @@ public:
                const real* slack)
         : stepper(at), surface(at, number, t, position), side(at.side(number)), time(t), q(position), p(momentum) {
         before = stepper.energy(time, q, p, &energy);
-        for (int i = 0; i < switches_of<K>(); ++i)
+        real velocity[n];
+        if (before == Status::ok) before = stepper.velocity(time, q, p, velocity);
+        for (int i = 0; i < switches_of<K>() && before == Status::ok; ++i)
             changes[i] = i == number || (K::refraction_of[i] >= 0 && fabs(value[i]) <= slack[i] &&
-                                         surface.is_parallel_to(Surface<K>(at, i, t, position)));
+                                         is_crossed_beside(Surface<K>(at, i, t, position), i, velocity, slack[i]));
     }
 
     // The momentum after it, and the side where the motion goes on.
@@ -179,6 +181,12 @@ private:
             }
         }
         return false;
+    }
+
+    // Whether the motion crosses another surface in the same place; it may touch one there.
+    bool is_crossed_beside(const Surface<K>& other, int i, const real* velocity, real slack) const {
+        const real towards = -other.speed(velocity) * stepper.side(i);
+        return towards * fabs(stepper.step_size) > slack && surface.is_parallel_to(other);
     }
 
     void change_side() {
