@@ -104,7 +104,7 @@ std::vector<Key> make_keys() {
                key("rest", Holds::formula, "The run ends at an impact that the motion leaves more slowly than this"),
                key("reset", Holds::names, "Positions and velocities after the impact, such as { \"x'\" = \"-x'\" }"),
                key("passes", Holds::truth,
-                   "True: the motion goes on beyond the wall, with the reset; so it does at a time")}),
+                   "True: the motion goes on beyond the wall, after the reset; at a time it always does")}),
         section(
             "method", "How it is integrated",
             {word("family", {"lobatto", "gauss", "splitting"}, "The family of methods"),
