@@ -67,15 +67,16 @@ std::vector<CheckedOutput> outputs_of(const Derivation& derivation, long operati
 
 }  // namespace
 
-Checked check_scene(Scene scene, bool general) {
+Checked check_scene(Scene scene, Shortcuts shortcuts) {
     Checked result;
     const Stopwatch watch;
-    result.derivation = derive(scene, general);
+    result.derivation = derive(scene, shortcuts);
     result.operations = operations_of(emit(result.derivation));
     result.seconds = watch.seconds();
-    scene.method.arithmetic = StepArithmetic::plain;                          // which the general path has alone
-    const bool alone = general || result.derivation.structure.is_explicit();  // which have no other path
-    result.without = alone ? result.derivation : derive(scene, true);
+    scene.method.arithmetic = StepArithmetic::plain;  // which the general path has alone
+    const bool alone =
+        shortcuts == Shortcuts::none || result.derivation.structure.is_explicit();  // which have no other path
+    result.without = alone ? result.derivation : derive(scene, Shortcuts::none);
     result.operations_without = alone ? result.operations : operations_of(emit(result.without));
     result.outputs = outputs_of(result.derivation, result.operations);
     return result;
@@ -96,8 +97,10 @@ std::string json_of(const Checked& checked) {
                                 ? scene.coordinates[i].written
                                 : "lambda_" + scene.constraints[i - scene.coordinates.size()].name);
         }
-        groups.push_back(
-            {{"coordinates", names}, {"unknowns", solve.unknowns}, {"band", solve.band}, {"method", solve.method}});
+        groups.push_back({{"coordinates", names},
+                          {"unknowns", solve.unknowns},
+                          {"band", solve.band},
+                          {"method", word_of(solve.matrix)}});
     }
     for (const CheckedOutput& output : checked.outputs)
         outputs.push_back({{"name", output.name}, {"asked", output.asked}, {"operations", output.operations}});

@@ -25,7 +25,7 @@ struct Checked {
 };
 
 // `general`: with no shortcut.
-Checked check_scene(Scene scene, bool general = false);
+Checked check_scene(Scene scene, Shortcuts shortcuts = Shortcuts::all);
 // For machines.
 std::string json_of(const Checked& checked);
 

@@ -23,15 +23,15 @@ void check_choice(const MethodChoice& choice) {
             throw InputError(fmt::format("there is no method {} with {}; there are {}", word_of(named->family),
                                          named->points, fmt::join(sizes, ", ")));
     }
-    if (choice.numbers && !precision_of(*choice.numbers))
+    if (!choice.numbers.empty() && !precision_of(choice.numbers))
         throw InputError("unknown numbers; there are " + precision_list());
-    if (choice.arithmetic && *choice.arithmetic != "clean" && *choice.arithmetic != "plain")
-        throw InputError(fmt::format("unknown arithmetic '{}'; there are \"plain\" and \"clean\"", *choice.arithmetic));
-    if (choice.clock && *choice.clock != "none" && *choice.clock != "auto")
+    if (!choice.arithmetic.empty() && choice.arithmetic != "clean" && choice.arithmetic != "plain")
+        throw InputError(fmt::format("unknown arithmetic '{}'; there are \"plain\" and \"clean\"", choice.arithmetic));
+    if (!choice.clock.empty() && choice.clock != "none" && choice.clock != "auto")
         throw InputError(
             fmt::format("unknown clock '{}'; there are \"none\", which means equal steps, and \"auto\"; a formula is "
                         "written into the scene, as `clock` under [method]",
-                        *choice.clock));
+                        choice.clock));
     if (!choice.tolerance) return;
     const std::string complaint = tolerance_complaint(*choice.tolerance, fmt::format("{}", *choice.tolerance));
     if (!complaint.empty()) throw InputError(complaint);
@@ -59,10 +59,10 @@ void MethodChoice::apply(Scene& scene) const {
     check_choice(*this);
     Method& method = scene.method;
     if (const std::optional<Method> named = member()) method.family = named->family, method.points = named->points;
-    if (numbers) method.numbers = *precision_of(*numbers);
+    if (!numbers.empty()) method.numbers = *precision_of(numbers);
     need_digits_for(method.numbers);
-    if (clock) scene = with_clock(*clock, std::move(scene));
-    if (arithmetic) method.arithmetic = *arithmetic == "clean" ? StepArithmetic::clean : StepArithmetic::plain;
+    if (!clock.empty()) scene = with_clock(clock, std::move(scene));
+    if (!arithmetic.empty()) method.arithmetic = arithmetic == "clean" ? StepArithmetic::clean : StepArithmetic::plain;
     if (tolerance) {
         if (method.arithmetic == StepArithmetic::clean)
             throw InputError(scene.path +

@@ -12,8 +12,8 @@ namespace lobatto {
 struct MethodChoice {
     std::optional<int> points, stages, splitting;  // one of them at most
     std::optional<double> tolerance;
-    std::optional<std::string> arithmetic, numbers;
-    std::optional<std::string> clock;  // "none": equal steps, "auto"
+    std::string arithmetic, numbers;  // empty: as in the scene, and so is `clock`
+    std::string clock;                // "none": equal steps, "auto"
 
     // InputError for what there is not, and for two methods at once.
     void apply(Scene& scene) const;

@@ -19,7 +19,7 @@ namespace {
 
 // Clean steps and those of splitting methods are steps of systems with a constant mass matrix and forces without
 // velocities.
-void check_method(const Scene& scene, const System& system, bool general) {
+void check_method(const Scene& scene, const System& system, Shortcuts shortcuts) {
     if (scene.clock && (scene.method.family == Family::splitting || scene.method.arithmetic == StepArithmetic::clean))
         throw InputError(
             fmt::format("{}: {} no clock; choose Lobatto or Gauss (--points 8){}", scene.path,
@@ -32,7 +32,7 @@ void check_method(const Scene& scene, const System& system, bool general) {
             fmt::format("{}: measured values have too few digits for numbers in {}; choose \"{} digits\" at most",
                         scene.path, precision_name(scene.method.numbers), digits_of_tables));
     if (scene.method.family == Family::splitting) {
-        if (general)
+        if (shortcuts == Shortcuts::none)
             throw InputError(scene.path +
                              ": splitting methods have no general path; leave out --general, or choose "
                              "another method (--points 4)");
@@ -46,7 +46,7 @@ void check_method(const Scene& scene, const System& system, bool general) {
                                   system.not_separable + "; choose Lobatto (--points 4) or Gauss (--stages 3)");
     }
     if (scene.method.arithmetic != StepArithmetic::clean) return;
-    if (general)
+    if (shortcuts == Shortcuts::none)
         throw InputError(scene.path +
                          ": the general path has no clean arithmetic; leave out --general, or add --arithmetic plain");
     if (!system.separable)
@@ -55,16 +55,16 @@ void check_method(const Scene& scene, const System& system, bool general) {
                               system.not_separable + "; use plain arithmetic (--arithmetic plain)");
 }
 
-Derivation derived(const Scene& scene, bool general, bool is_short) {
+Derivation derived(const Scene& scene, Shortcuts shortcuts, System (*system_of)(const Scene&)) {
     Derivation derivation;
     derivation.scene = in_clock_time(scene);
-    derivation.system = is_short ? build_short_system(derivation.scene) : build_system(derivation.scene);
-    check_method(scene, derivation.system, general);
+    derivation.system = system_of(derivation.scene);
+    check_method(scene, derivation.system, shortcuts);
     check_impacts(derivation.scene, derivation.system);
     check_start(derivation.scene, derivation.system);
     derivation.quadrature = quadrature_of(scene.method);
     std::tie(derivation.structure, derivation.findings) =
-        find_structure(derivation.scene, derivation.system, derivation.quadrature, general);
+        find_structure(derivation.scene, derivation.system, derivation.quadrature, shortcuts);
     return derivation;
 }
 
@@ -75,16 +75,16 @@ bool is_whole(const Derivation& derivation) {
 
 }  // namespace
 
-Derivation derive(const Scene& scene, bool general) {
+Derivation derive(const Scene& scene, Shortcuts shortcuts) {
     const DerivationLimits limits(scene.path);
-    return derived(scene, general, false);
+    return derived(scene, shortcuts, build_system);
 }
 
-Derivation derive_kernel(const Scene& scene, bool general) {
+Derivation derive_kernel(const Scene& scene, Shortcuts shortcuts) {
     const DerivationLimits limits(scene.path);
-    if (general) return derived(scene, true, false);
-    Derivation derivation = derived(scene, false, true);
-    return is_whole(derivation) ? derivation : derived(scene, false, false);
+    if (shortcuts == Shortcuts::none) return derived(scene, shortcuts, build_system);
+    Derivation derivation = derived(scene, shortcuts, build_short_system);
+    return is_whole(derivation) ? derivation : derived(scene, shortcuts, build_system);
 }
 
 Derivation with_method(const Derivation& derivation, const Method& method) {
@@ -92,10 +92,10 @@ Derivation with_method(const Derivation& derivation, const Method& method) {
     other.scene = derivation.scene;
     other.scene.method = method;
     other.system = derivation.system;
-    check_method(other.scene, other.system, derivation.structure.full());
+    check_method(other.scene, other.system, derivation.structure.shortcuts());
     other.quadrature = quadrature_of(method);
     std::tie(other.structure, other.findings) =
-        find_structure(other.scene, other.system, other.quadrature, derivation.structure.full());
+        find_structure(other.scene, other.system, other.quadrature, derivation.structure.shortcuts());
     if (!is_whole(other)) {
         other.system = build_system(other.scene);
         std::tie(other.structure, other.findings) = find_structure(other.scene, other.system, other.quadrature);
@@ -133,8 +133,8 @@ PlainSource emit_plain(Scene scene, Precision precision) {
     Derivation derivation = derive(scene);
     const DerivationLimits limits(scene.path);
     // No shortcuts: they are worth their lines only where speed is asked for.
-    if (derivation.structure.form() == Form::general)
-        derivation = derive(scene, true);
+    if (derivation.structure.form() == StepForm::general)
+        derivation = derive(scene, Shortcuts::none);
     else
         derivation.structure.iterate();
     derivation.structure.looped = false;

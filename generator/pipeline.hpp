@@ -9,11 +9,10 @@
 
 namespace lobatto {
 
-// `general`: with every shortcut of Structure switched off.
-Derivation derive(const Scene& scene, bool general = false);
+Derivation derive(const Scene& scene, Shortcuts shortcuts = Shortcuts::all);
 // The same for who only writes and runs the kernel: where hundreds of terms are one formula, the derivatives of each
 // are not written out (System::unwritten).
-Derivation derive_kernel(const Scene& scene, bool general = false);
+Derivation derive_kernel(const Scene& scene, Shortcuts shortcuts = Shortcuts::all);
 // The same system by another member of the family: only what depends on it is found anew.
 Derivation with_method(const Derivation& derivation, const Method& method);
 KernelSource emit(const Derivation& derivation, const EmitOptions& options = {});

@@ -82,8 +82,9 @@ Kernel compile(const Scene& scene, const Settings& settings) {
                 "run(), which computes in all numbers",
                 changed.path, precision_name(changed.method.numbers)));
         const Overrides overrides = overrides_of(settings);
-        const DerivedKernel derived = derived_kernel(changed, {Precision::double_, false, EnergyWatch::can_watch},
-                                                     nullptr, with_values(changed, overrides));
+        const DerivedKernel derived =
+            derived_kernel(changed, {Precision::double_, Shortcuts::all, EnergyWatch::can_watch}, nullptr,
+                           with_values(changed, overrides));
         apply(overrides, changed);
         if (!overrides.set.empty()) check_values(changed);
         const Steps steps = steps_of(changed, overrides);

@@ -39,11 +39,12 @@ std::optional<Method> companion_method(const lobatto::Scene& scene, const RunOpt
 
 }  // namespace
 
-OpenedRun::OpenedRun(const Scene& scene, const RunOptions& options, bool general)
+OpenedRun::OpenedRun(const Scene& scene, const RunOptions& options, Shortcuts shortcuts)
     : beyond_horizon_(options.beyond_horizon) {
     in_algebra([&] {
         const lobatto::Scene chosen = with_method(scene, options);
-        parts_.reset(new Parts{prepare_run(chosen, overrides_of(options), general, companion_method(chosen, options))});
+        parts_.reset(
+            new Parts{prepare_run(chosen, overrides_of(options), shortcuts, companion_method(chosen, options))});
         const PreparedRun& prepared = parts_->prepared;
         TrajectoryRequest& request = parts_->request;
         LoadedStepper<double> stepper(prepared.plain);

@@ -18,8 +18,8 @@ namespace lobatto::api {
 
 class OpenedRun {
 public:
-    // `general`: with no shortcut. Throws Error, like all of it.
-    OpenedRun(const Scene& scene, const RunOptions& options, bool general = false);
+    // Throws Error, like all of it.
+    OpenedRun(const Scene& scene, const RunOptions& options, Shortcuts shortcuts = Shortcuts::all);
     OpenedRun(const OpenedRun&) = delete;
     OpenedRun& operator=(const OpenedRun&) = delete;
 

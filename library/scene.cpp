@@ -20,11 +20,8 @@ std::recursive_mutex& algebra() {
 }
 
 MethodChoice method_of(const Settings& settings) {
-    MethodChoice choice{settings.points, settings.stages, settings.splitting, settings.tolerance, {}, {}, {}};
-    if (!settings.arithmetic.empty()) choice.arithmetic = settings.arithmetic;
-    if (!settings.numbers.empty()) choice.numbers = settings.numbers;
-    if (!settings.clock.empty()) choice.clock = settings.clock;
-    return choice;
+    return {settings.points,     settings.stages,  settings.splitting, settings.tolerance,
+            settings.arithmetic, settings.numbers, settings.clock};
 }
 
 std::pair<std::string, std::string> named_value(const std::string& argument) {

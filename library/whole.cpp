@@ -15,9 +15,9 @@
 
 namespace lobatto::api {
 
-Checked checked(const Scene& scene, const Settings& settings, bool general) {
+Checked checked(const Scene& scene, const Settings& settings, Shortcuts shortcuts) {
     refuse_values(settings, "check");
-    return check_scene(with_method(scene, settings), general);
+    return check_scene(with_method(scene, settings), shortcuts);
 }
 
 Description described(const Scene& scene, const Settings& settings) {
@@ -33,7 +33,7 @@ KernelSource emitted(const Scene& scene, const Settings& settings, const EmitWis
         options.support_text = [&](const std::vector<std::string>& parts) {
             return support_text(wish.ensemble ? with_ensemble(parts) : parts);
         };
-    return lobatto::emit(derive_kernel(changed, wish.general), options);
+    return lobatto::emit(derive_kernel(changed, wish.shortcuts), options);
 }
 
 PlainSource plainly_emitted(const Scene& scene, const Settings& settings) {

@@ -21,12 +21,11 @@
 
 namespace lobatto::api {
 
-// `general`: with no shortcut.
-Checked checked(const Scene& scene, const Settings& settings, bool general = false);
+Checked checked(const Scene& scene, const Settings& settings, Shortcuts shortcuts = Shortcuts::all);
 Description described(const Scene& scene, const Settings& settings);
 
 struct EmitWish {
-    bool general = false;
+    Shortcuts shortcuts = Shortcuts::all;
     bool standalone = true;  // carries kernel.hpp inside
     bool ensemble = false;   // that with lobatto::Ensemble
 };

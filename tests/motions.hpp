@@ -126,10 +126,10 @@ inline Motion lattice() {
 
 // `method`: the lines under [method]; `output`: those under [output].
 inline Derivation derivation_of(const Motion& motion, const std::string& method, const std::string& output = "",
-                                bool general = false) {
+                                Shortcuts shortcuts = Shortcuts::all) {
     return derive(read_scene(Source("motion.toml", "title = \"Motion\"\n" + motion.body + "[method]\n" + method +
                                                        "\n[run]\nstep = 0.1\nuntil = 1\n[output]\n" + output + "\n")),
-                  general);
+                  shortcuts);
 }
 
 // Without fixed-point iterations: each step by Newton's iteration alone.

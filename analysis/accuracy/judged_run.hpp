@@ -37,7 +37,7 @@ struct PreparedRun {
 // The overrides are applied after the derivation: one kernel serves all values. `general`: with no shortcut.
 // `companion`: the method in finer numbers, for a companion that computes in these.
 // Throws InputError, ComputationError, MachineError.
-PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general = false,
+PreparedRun prepare_run(Scene scene, const Overrides& overrides, Shortcuts shortcuts = Shortcuts::all,
                         std::optional<Method> companion = {});
 
 // That a run which went on to its end ends before the time that was asked for. Empty: it does not.

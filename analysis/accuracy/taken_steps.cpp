@@ -43,7 +43,7 @@ template <class real>
 std::vector<std::vector<cln::cl_R>> path_of(const Derivation& derivation, const LoadedStepper<real>& stepper,
                                             const std::vector<real>& start, const std::vector<real>& end) {
     std::vector<std::vector<cln::cl_R>> path = {exact(start)};
-    const bool is_solved = derivation.structure.form() != Form::linear_map && !derivation.quadrature.is_explicit();
+    const bool is_solved = derivation.structure.form() != StepForm::linear_map && !derivation.quadrature.is_explicit();
     Formulas formulas;
     const std::vector<cln::cl_R> control = formulas(derivation.quadrature.control);
     for (std::size_t j = 1; is_solved && j + 1 < control.size(); ++j) {
@@ -143,7 +143,7 @@ double jacobian_defect(const Derivation& derivation, const Kernel& kernel, const
         stepper.advance(call) != LOBATTO_OK)
         fail();
     // Unknowns are positions, point by point, of the coordinates that are solved for, and after them multipliers.
-    const bool is_general = derivation.structure.form() == Form::general;
+    const bool is_general = derivation.structure.form() == StepForm::general;
     std::vector<int> solved_for;
     if (is_general) solved_for = derivation.structure.routhian().active;
     for (int k = 0; !is_general && k < derivation.system.n; ++k) solved_for.push_back(k);

@@ -14,8 +14,7 @@ Scene ending_at_stop(Scene scene) {
     if (!scene.may_end_early()) return scene;
     Scene looking = scene;
     looking.method.numbers = Precision::double_;
-    const Kernel kernel =
-        kernel_of(derived_kernel(looking, {Precision::double_, false, {}}).source, Precision::double_);
+    const Kernel kernel = kernel_of(derived_kernel(looking, {}).source, Precision::double_);
     LoadedStepper<double> stepper(kernel);
     TrajectoryRequest request = request_of(looking, steps_of(looking).count, stepper);
     request.events = [](const EventRecords&) {};  // stops are sought with them

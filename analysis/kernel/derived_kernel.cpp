@@ -24,7 +24,7 @@ using Json = nlohmann::json;
 std::string key_of(const Scene& scene, const std::vector<Parameter>& values, const KernelWish& wish) {
     std::string key =
         fmt::format("program: {}\nname: {}\nnumbers: {}, general: {}, wants energy: {}\n", build_id(), scene.name,
-                    precision_name(wish.precision), wish.general, wish.wants_energy != nullptr);
+                    precision_name(wish.precision), wish.shortcuts == Shortcuts::none, wish.wants_energy != nullptr);
     const Method& method = scene.method;
     key += fmt::format("method: {} {} {:a} {} {}\n", static_cast<int>(method.family), method.points, method.tolerance,
                        static_cast<int>(method.arithmetic), static_cast<int>(method.numbers));
@@ -103,7 +103,7 @@ DerivedKernel from_text(const std::string& text, const Scene& scene, const Kerne
     SystemFacts facts{json.at("autonomous"), json.at("linear"), json.at("drops_time"), std::nullopt};
     if (json.contains("closed_solution")) facts.closed_solution = kept_solution(json["closed_solution"], scene);
     DerivedKernel kernel{Outline(scene, facts), {}, true, nullptr};
-    kernel.source.form = static_cast<Form>(json.at("form").get<int>());
+    kernel.source.form = static_cast<StepForm>(json.at("form").get<int>());
     kernel.source.name = json.at("name");
     kernel.source.formulas = json.at("formulas");
     kernel.source.support = json.at("support").get<std::vector<std::string>>();
@@ -114,7 +114,7 @@ DerivedKernel from_text(const std::string& text, const Scene& scene, const Kerne
 
 DerivedKernel derived(const Scene& scene, const KernelWish& wish, const Derivation* known) {
     const auto derivation =
-        std::make_shared<Derivation>(known != nullptr ? *known : derive_kernel(scene, wish.general));
+        std::make_shared<Derivation>(known != nullptr ? *known : derive_kernel(scene, wish.shortcuts));
     DerivedKernel kernel{Outline(*derivation), {}, false, derivation};
     wish_for_energy(kernel.outline, wish);
     derivation->scene.outputs.energy = kernel.outline.scene.outputs.energy;

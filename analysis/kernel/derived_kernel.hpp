@@ -22,7 +22,7 @@ struct DerivedKernel {
 // What a kernel is to have beside what its scene asks for.
 struct KernelWish {
     Precision precision = Precision::double_;
-    bool general = false;  // none of the shortcuts that the scene allows
+    Shortcuts shortcuts = Shortcuts::all;
     // Where this holds it computes the energy, also where the scene does not ask for it.
     bool (*wants_energy)(const Outline&) = nullptr;
 };

@@ -99,7 +99,7 @@ std::string why_not_on_device(const Scene& scene) {
 Translation host_side_of(const KernelSource& source, Precision precision, const WatchedLanes& watched) {
     Translation translation;
     translation.name = source.name;
-    translation.short_loops = source.form == Form::general;
+    translation.short_loops = source.form == StepForm::general;
     translation.text = before_support(precision);
     append_lanes(translation.text, source, source.formulas, watched);
     translation.text += export_lanes + source.name + ")\n";

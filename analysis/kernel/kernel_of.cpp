@@ -48,7 +48,7 @@ Translation translation_of(const KernelSource& source, Precision precision, std:
     translation.name = source.name;
     translation.quadruple = precision == Precision::quadruple;
     translation.many_digits = has_many_digits(precision) ? asked_digits(precision) : 0;
-    translation.short_loops = source.form == Form::general;
+    translation.short_loops = source.form == StepForm::general;
     translation.text = before_support(precision);
     if (together > 0) {  // a pair of registers holds 8 or 16 doubles, or twice as many floats; every text is compiled
         const int wide = precision == Precision::single ? 2 : 1;  // by itself

@@ -37,10 +37,10 @@ void energy(std::vector<ProofRow>& rows, const Kernel& kernel, const StartWithSt
 
 }  // namespace
 
-ProofRow order_row(const Convergence& convergence, const Kernel& kernel, const QuadrupleStart& start) {
+ProofRow order_row(const MeasuredOrder& convergence, const Kernel& kernel, const QuadrupleStart& start) {
     const bool holds = bears_out(convergence, kernel->order, kernel->linear != 0);
     const std::string bound = fmt::format("{} {}", kernel->linear ? "at least" : "about", kernel->order);
-    const auto is_saturated = [](const ConvergenceRow& row) { return row.error > saturated; };
+    const auto is_saturated = [](const OrderRow& row) { return row.error > saturated; };
     if (!convergence.rows.empty() && std::all_of(convergence.rows.begin(), convergence.rows.end(), is_saturated))
         return not_decided("order of convergence", "with all steps the error is as large as the motion");
     if (convergence.below_rounding) return {"order of convergence", "below rounding", "not judged", holds, ""};

@@ -11,7 +11,7 @@
 
 namespace lobatto {
 
-ProofRow order_row(const Convergence& convergence, const Kernel& kernel, const QuadrupleStart& start);
+ProofRow order_row(const MeasuredOrder& convergence, const Kernel& kernel, const QuadrupleStart& start);
 
 void prove_momenta(std::vector<ProofRow>& rows, const Kernel& kernel, const StartWithStep<double>& start,
                    const Scene& scene);

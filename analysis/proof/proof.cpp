@@ -111,7 +111,7 @@ Proof prove(const Scene& written, const MethodChoice& method,
         rows.push_back({"symplectic step, reversal", "left out", fmt::format("n > {}", tangent_limit), true, ""});
     const double of_decimals =
         scene.method.family == Family::splitting ? 100 * std::pow(10.0, -splitting_of(scene.method.points).digits) : 0;
-    Convergence& convergence = proof.convergence;
+    MeasuredOrder& convergence = proof.convergence;
     say("measuring the order of convergence", 0.93);
     rows.push_back(decided("order of convergence", [&] {
         if (moves_by_tables(scene)) return not_promised("order of convergence", "steps cross knots of measured values");

@@ -8,14 +8,14 @@
 
 #include "analysis/method_choice.hpp"
 #include "analysis/proof/proof_row.hpp"
-#include "runtime/measure/convergence.hpp"
+#include "runtime/measure/measured_order.hpp"
 
 namespace lobatto {
 
 struct Proof {
     std::string title, method;
     std::vector<ProofRow> rows;
-    Convergence convergence;  // without rows where it was not measured
+    MeasuredOrder convergence;  // without rows where it was not measured
 };
 
 // InputError, ComputationError where not even a first step can be taken.

@@ -8,7 +8,7 @@
 #include "analysis/exact_start.hpp"
 #include "analysis/proof/proof_row.hpp"
 #include "generator/mechanics/derivation.hpp"
-#include "runtime/measure/convergence.hpp"
+#include "runtime/measure/measured_order.hpp"
 
 namespace lobatto {
 

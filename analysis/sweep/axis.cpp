@@ -122,19 +122,18 @@ private:
         };
         for (std::int64_t i = 0; i < axis_.count; ++i) {
             const double value = axis_.exact(i).to_double();
-            const auto is_whole_in = [&](double least, double most) {
-                return value == std::round(value) && value >= least && value <= most;
+            const auto check_size = [&](Family family, const std::string& there_are) {
+                const std::vector<int>& sizes = sizes_of(family);
+                if (std::find(sizes.begin(), sizes.end(), value) == sizes.end()) fail(value, there_are);
             };
             if (role == Role::step && !(value > 0)) fail(value, "a step must be positive");
             if (role == Role::tolerance && !(value > 0 && value <= 1e-3))
                 fail(value, "a tolerance must be above 0 and at most 0.001");
-            if (role == Role::points && !is_whole_in(2, 12)) fail(value, "Lobatto has 2 to 12 points, a whole number");
-            if (role == Role::stages && !is_whole_in(1, 10)) fail(value, "Gauss has 1 to 10 stages, a whole number");
-            if (role == Role::splitting) {
-                const std::vector<int> there = splitting_stages();
-                if (std::find(there.begin(), there.end(), value) == there.end())
-                    fail(value, fmt::format("splitting methods have {} stages", fmt::join(there, ", ")));
-            }
+            if (role == Role::points) check_size(Family::lobatto, "Lobatto has 2 to 12 points, a whole number");
+            if (role == Role::stages) check_size(Family::gauss, "Gauss has 1 to 10 stages, a whole number");
+            if (role == Role::splitting)
+                check_size(Family::splitting, fmt::format("splitting methods have {} stages",
+                                                          fmt::join(sizes_of(Family::splitting), ", ")));
         }
     }
 

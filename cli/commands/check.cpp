@@ -10,9 +10,8 @@
 #include <thread>
 
 #include "cli/commands/commands.hpp"
-#include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
 #include "cli/print/tell.hpp"
@@ -26,8 +25,8 @@ namespace {
 
 struct CheckCommand {
     std::string scene;
-    MethodOption method;
-    bool general = false;
+    api::Settings settings;
+    Shortcuts shortcuts = Shortcuts::all;
     bool json = false;
     bool watch = false;
 };
@@ -100,7 +99,7 @@ void check(const CheckCommand& options) {
     const api::Scene scene(options.scene);
     Say say;
     say("deriving");
-    const Checked checked = api::checked(scene, settings_of(options.method), options.general);
+    const Checked checked = api::checked(scene, options.settings, options.shortcuts);
     say.clear();
     if (options.json)
         std::cout << json_of(checked) << '\n';
@@ -144,8 +143,8 @@ void add_check(CommandLine& program) {
     Command command =
         program.command("check", "Say in plain words what was found in a scene, and what its kernel leaves out");
     command.option("SCENE", options->scene, "Scene file").required();
-    options->method.add_to(command);
-    command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
+    add_method_options(command, options->settings);
+    add_general_flag(command, options->shortcuts);
     add_json_option(command, options->json);
     command.flag("--watch", options->watch, "Print again whenever the scene is saved");
     command.footer("Example:\n  lobatto check scenes/two_pendulums.toml");

@@ -4,9 +4,8 @@
 
 #include "cli/commands/commands.hpp"
 
-#include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/say.hpp"
 #include "library/whole.hpp"
 
@@ -16,7 +15,7 @@ namespace {
 
 struct DeriveCommand {
     std::string scene;
-    MethodOption method;
+    api::Settings settings;
     bool latex = false;
     bool json = false;
 };
@@ -25,7 +24,7 @@ void derive_scene(const DeriveCommand& options) {
     const api::Scene scene(options.scene);
     Say say;
     say("deriving");
-    const Description description = api::described(scene, settings_of(options.method));
+    const Description description = api::described(scene, options.settings);
     say.clear();
     std::cout << (options.latex ? latex_of(description) : options.json ? json_of(description) : text_of(description));
 }
@@ -36,7 +35,7 @@ void add_derive(CommandLine& program) {
     const auto options = std::make_shared<DeriveCommand>();
     Command command = program.command("derive", "Show how the integrator of a scene follows from its Lagrangian");
     command.option("SCENE", options->scene, "Scene file").required();
-    options->method.add_to(command);
+    add_method_options(command, options->settings);
     const Option latex = command.flag("--latex", options->latex, "A complete LaTeX document");
     add_json_option(command, options->json).excludes(latex);
     command.footer("Example:\n  lobatto derive scenes/pendulum.toml --latex > pendulum.tex");

@@ -9,9 +9,8 @@
 
 #include "analysis/kernel/support_text.hpp"
 #include "cli/commands/commands.hpp"
-#include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/say.hpp"
 #include "generator/emit/header.hpp"
@@ -29,8 +28,8 @@ namespace fs = std::filesystem;
 struct EmitCommand {
     std::string scene;
     std::string folder;
-    MethodOption method;
-    bool general = false;
+    api::Settings settings;
+    Shortcuts shortcuts = Shortcuts::all;
     bool standalone = false;
     bool no_support = false;
     bool ensemble = false;
@@ -119,7 +118,7 @@ void write_plain(const PlainSource& source, const EmitCommand& options) {
 
 void emit_scene(const EmitCommand& options) {
     const api::Scene scene(options.scene);
-    const api::Settings settings = settings_of(options.method);
+    const api::Settings& settings = options.settings;
     if (options.ensemble && !options.standalone)
         throw InputError(
             "--ensemble: kernel.hpp carries ensembles anyway; leave --ensemble out, or add --standalone for one file");
@@ -139,7 +138,8 @@ void emit_scene(const EmitCommand& options) {
     }
     Say say;
     say("deriving");
-    const KernelSource source = api::emitted(scene, settings, {options.general, options.standalone, options.ensemble});
+    const KernelSource source =
+        api::emitted(scene, settings, {options.shortcuts, options.standalone, options.ensemble});
     say.clear();
     if (printed) {
         fmt::print(std::cout, "{}", source.header);
@@ -184,9 +184,8 @@ void add_emit(CommandLine& program) {
                 "Folder for NAME.hpp and the kernel.hpp that it includes; - prints one file")
         .required()
         .shown_as("FOLDER");
-    options->method.add_to(command);
-    const Option general =
-        command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
+    add_method_options(command, options->settings);
+    const Option general = add_general_flag(command, options->shortcuts);
     const Option standalone =
         command.flag("--standalone", options->standalone, "One file that carries kernel.hpp inside");
     const Option no_support =

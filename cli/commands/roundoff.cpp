@@ -7,9 +7,8 @@
 
 #include "analysis/motion.hpp"
 #include "cli/commands/commands.hpp"
-#include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/interruption.hpp"
@@ -25,8 +24,7 @@ namespace {
 
 struct RoundoffCommand {
     std::string scene, output;
-    MethodOption method;
-    Overrides overrides;
+    api::Settings settings;
     std::int64_t steps = 100000;
     int trajectories = 16;
     bool no_reference = false, no_picture = false, json = false;
@@ -95,7 +93,7 @@ void print(const RoundoffResult& result) {
 }
 
 void roundoff(const RoundoffCommand& options) {
-    Scene scene = api::for_roundoff(api::Scene(options.scene), settings_of(options.method, options.overrides));
+    Scene scene = api::for_roundoff(api::Scene(options.scene), options.settings);
     const std::string name = scene.method.name(), path = scene.path;
     const double step = step_of(scene).to_double();
     const std::string folder = output_folder(options.output, result_name(scene.path) + "_roundoff"),
@@ -152,9 +150,9 @@ void add_roundoff(CommandLine& program) {
     command.option("--trajectories", options->trajectories, "Whose mean is taken (default: 16)")
         .shown_as("N")
         .between(2, 1000);
-    options->method.add_members_to(command);
-    add_step_option(command, options->overrides);
-    add_set_option(command, options->overrides);
+    add_member_options(command, options->settings);
+    add_step_option(command, options->settings);
+    add_set_option(command, options->settings);
     command.option("-o,--output", options->output, "Folder of the table and the picture (default: out/NAME_roundoff)")
         .shown_as("FOLDER");
     command.flag("--no-reference", options->no_reference,

@@ -10,10 +10,9 @@
 #include "analysis/exact_start.hpp"
 #include "analysis/tradeoff/candidate.hpp"
 #include "cli/commands/commands.hpp"
-#include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
 #include "cli/options/resume.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/after_a_while.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
@@ -35,9 +34,8 @@ namespace {
 struct RunOptions {
     std::string scene;
     std::string output;  // empty: out/NAME.csv
-    MethodOption method;
-    bool general = false;
-    Overrides overrides;
+    api::Settings settings;
+    Shortcuts shortcuts = Shortcuts::all;
     bool resume = false;
     bool unmeasured = false;
     std::string companion;
@@ -142,7 +140,7 @@ std::string defect_text(const PreparedRun& run) {
 }
 
 bool ends_at_tolerance(const PreparedRun& run, const TrajectoryRequest& request) {
-    const bool has_constant_masses = run.source.form != Form::general;
+    const bool has_constant_masses = run.source.form != StepForm::general;
     return request.tolerance > 0 && heeds_tolerance(run.scene.method, run.kernel->linear != 0, has_constant_masses);
 }
 
@@ -196,17 +194,25 @@ void print_events(const Scene& scene, const TrajectoryResult& result, const std:
         print_row("stopped", fmt::format("{} '{}' at t = {:.9g}", number < impacts ? "by" : "at rest on",
                                          watched[number].text, result.time));
     }
-    bool is_named = false;
-    for (std::size_t i = 0; i < watched.size(); ++i) {
-        if (i == impacts) is_named = false;
-        if (i >= stops && i < impacts) continue;
-        print_row(
-            is_named      ? ""
-            : i < impacts ? "events"
-                          : "impacts",
-            fmt::format("{} of '{}'{}", counts[1 + i], watched[i].text, i + 1 < watched.size() ? "" : ", in " + path));
-        is_named = true;
-    }
+    // Of many those that happened.
+    const auto print = [&](const char* what, std::size_t first, std::size_t last) {
+        constexpr std::size_t many = 10;
+        std::vector<std::string> rows;
+        std::size_t others = 0;
+        for (std::size_t i = first; i < last; ++i)
+            if (counts[1 + i] == 0 && last - first > many)
+                ++others;
+            else
+                rows.push_back(fmt::format("{} of '{}'", counts[1 + i], watched[i].text));
+        if (others > 0)
+            rows.push_back(rows.empty() ? fmt::format("none of {}", others)
+                                        : fmt::format("none of the {} others", others));
+        for (std::size_t k = 0; k < rows.size(); ++k)
+            print_row(k == 0 ? what : "",
+                      rows[k] + (last == watched.size() && k + 1 == rows.size() ? ", in " + path : ""));
+    };
+    print("events", 0, stops);
+    print("impacts", impacts, watched.size());
 }
 
 // Beside the trajectory: run.csv, run.events.csv. A pipe or a device has no beside: then as without -o.
@@ -284,7 +290,7 @@ const TrajectoryResult& go_into(Files& files, api::OpenedRun& run, const std::st
 
 api::RunOptions wish_of(const RunOptions& options) {
     api::RunOptions wish;
-    static_cast<api::Settings&>(wish) = settings_of(options.method, options.overrides);
+    static_cast<api::Settings&>(wish) = options.settings;
     wish.measure = !options.unmeasured;
     wish.companion = options.companion;
     wish.beyond_horizon = options.beyond_horizon;
@@ -338,7 +344,7 @@ void run(const RunOptions& options) {
     Say say;
     if (!quiet) say("deriving and compiling");
     std::optional<AfterAWhile> waiting(quiet ? "" : on_long_formulas(read.parts().scene));
-    api::OpenedRun opened(read, wish_of(options), options.general);
+    api::OpenedRun opened(read, wish_of(options), options.shortcuts);
     waiting.reset();
     say.clear();
     const PreparedRun& run = opened.prepared();
@@ -385,7 +391,7 @@ void run(const RunOptions& options) {
         print_table(run, request, result, observers.watch);
         if (verdict.error)
             print_row("measured error", text_of(*verdict.error, scene));
-        else if (!options.unmeasured && result.stop >= 0)
+        else if (!options.unmeasured && result.stop >= 0 && result.steps_done > 0)
             print_row("measured error", "none: the companion did not come to the stop");
         print_events(scene, result, observers.counts, files.events_path());
         const double states = observers.counts[0];
@@ -406,13 +412,13 @@ void add_run(CommandLine& program) {
         .option("-o,--output", options->output,
                 "Trajectory: .csv, .npy (NumPy) or .h5 (HDF5), or - for standard output (default: out/NAME.csv)")
         .shown_as("FILE");
-    options->method.add_to(command);
-    command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
-    add_step_option(command, options->overrides);
-    add_until_option(command, options->overrides);
-    command.option("--every", options->overrides.every, "Keep every N-th state; with a clock the time between two")
+    add_method_options(command, options->settings);
+    add_general_flag(command, options->shortcuts);
+    add_step_option(command, options->settings);
+    add_until_option(command, options->settings);
+    command.option("--every", options->settings.every, "Keep every N-th state; with a clock the time between two")
         .shown_as("N");
-    add_set_option(command, options->overrides);
+    add_set_option(command, options->settings);
     command.flag("--resume", options->resume,
                  "Continue the same run where it was interrupted or killed, in a .csv; its files are then the same, "
                  "byte for byte");

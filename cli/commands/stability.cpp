@@ -10,9 +10,8 @@
 #include "analysis/stability/chart.hpp"
 #include "analysis/stability/json.hpp"
 #include "cli/commands/commands.hpp"
-#include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/drawing.hpp"
 #include "cli/print/stability_text.hpp"
 #include "generator/formula/text/source.hpp"
@@ -33,8 +32,7 @@ std::vector<Method> all_methods() {
 struct StabilityCommand {
     std::optional<std::string> scene;
     std::string chart;
-    MethodOption method;
-    Overrides overrides;
+    api::Settings settings;
     bool json = false;
 };
 
@@ -68,11 +66,12 @@ std::string text_of_splitting(const Method& method) {
 }
 
 void show_members(const StabilityCommand& options) {
-    if (!options.chart.empty() || !options.overrides.step.empty() || !options.overrides.set.empty())
+    if (!options.chart.empty() || !options.settings.step.empty() || !options.settings.set.empty())
         throw InputError("--chart, --step and --set belong to a scene; name one");
-    if (options.method.tolerance || options.method.arithmetic || options.method.numbers || options.method.clock)
+    const MethodChoice choice = api::method_of(options.settings);
+    if (choice.tolerance || !choice.arithmetic.empty() || !choice.numbers.empty() || !choice.clock.empty())
         throw InputError("--tolerance, --arithmetic, --numbers and --clock belong to a scene; name one");
-    const std::optional<Method> member = options.method.member();
+    const std::optional<Method> member = choice.member();
     if (member && member->family == Family::splitting) {
         if (options.json) throw InputError("--json is of Lobatto and Gauss, whose limits are exact; leave it out");
         std::cout << text_of_splitting(*member);
@@ -86,8 +85,7 @@ void show_members(const StabilityCommand& options) {
 
 void show_scene(const StabilityCommand& options) {
     const fs::path chart = options.chart.empty() ? fs::path() : chart_path(options.chart, *options.scene);
-    const StabilityReport report =
-        api::stability_of(api::Scene(*options.scene), settings_of(options.method, options.overrides));
+    const StabilityReport report = api::stability_of(api::Scene(*options.scene), options.settings);
     if (!chart.empty())
         draw(chart.has_parent_path() ? chart.parent_path().string() : ".", chart.stem().string(),
              stability_chart(report), 900, 640, "leave --chart out");
@@ -103,9 +101,9 @@ void add_stability(CommandLine& program) {
     command.option(
         "SCENE", options->scene,
         "Scene file; it is looked at in double, without a clock (default: none, every member of both families)");
-    options->method.add_to(command);
-    add_step_option(command, options->overrides);
-    add_set_option(command, options->overrides);
+    add_method_options(command, options->settings);
+    add_step_option(command, options->settings);
+    add_set_option(command, options->settings);
     command.option("--chart", options->chart, "Draw trace and growth, theory and measurement, into this SVG file")
         .shown_as("FILE");
     add_json_option(command, options->json);

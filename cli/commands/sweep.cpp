@@ -9,9 +9,8 @@
 #include "analysis/sweep/tally.hpp"
 #include "analysis/sweep/warnings.hpp"
 #include "cli/commands/commands.hpp"
-#include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/options/starts.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/progress.hpp"
@@ -37,8 +36,7 @@ struct SweepOptions {
     std::vector<std::string> keep;
     std::string output;  // empty: out/NAME.sweep.csv
     std::string format;  // empty: told by the name of the output
-    MethodOption method;
-    Overrides overrides;
+    api::Settings settings;
     std::optional<std::int64_t> steps;
     std::string device = "cpu";
     int threads = 0;
@@ -95,7 +93,7 @@ TableHead head_of(const SweepStudy& study) {
 
 api::OpenedSweep study_of(const SweepOptions& options, int threads) {
     api::SweepOptions wish;
-    static_cast<api::Settings&>(wish) = settings_of(options.method, options.overrides);
+    static_cast<api::Settings&>(wish) = options.settings;
     wish.keep = options.keep;
     wish.device = options.device == "cuda"   ? api::Device::cuda
                   : options.device == "auto" ? api::Device::automatic
@@ -287,15 +285,15 @@ void add_sweep(CommandLine& program) {
     command.flag("--resume", options->resume,
                  "Continue the same sweep where it was interrupted or killed; its table is then the same, byte for "
                  "byte");
-    options->method.add_to(command);
-    add_step_option(command, options->overrides);
-    const Option until = add_until_option(command, options->overrides);
+    add_method_options(command, options->settings);
+    add_step_option(command, options->settings);
+    const Option until = add_until_option(command, options->settings);
     command.option("--steps", options->steps, "Number of steps, instead of an end time").shown_as("N").excludes(until);
     command
-        .option("--every", options->overrides.every,
+        .option("--every", options->settings.every,
                 "Keep the start, every N-th state and the last one (default: the last one alone)")
         .shown_as("N");
-    add_set_option(command, options->overrides);
+    add_set_option(command, options->settings);
     command
         .option("--device", options->device,
                 "What takes the steps: cpu, cuda (an NVIDIA GPU; docs/gpu.md), or auto, the faster of both (default: "

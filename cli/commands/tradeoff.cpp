@@ -6,7 +6,7 @@
 #include "cli/commands/commands.hpp"
 #include "cli/options/budget.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
 #include "cli/print/summary.hpp"
@@ -26,7 +26,7 @@ struct TradeoffOptions {
     std::string scene;
     std::string output;  // a folder; empty: out/NAME.tradeoff
     BudgetOption budget;
-    Overrides overrides;
+    api::Settings settings;
     bool json = false;
 };
 
@@ -47,8 +47,7 @@ std::string names_of(const std::vector<Member>& members) {
 
 void tradeoff(const TradeoffOptions& options) {
     const double seconds = options.budget.seconds();
-    const api::ChangedScene scenes =
-        api::measurable(api::Scene(options.scene), settings_of({}, options.overrides), "lobatto tradeoff");
+    const api::ChangedScene scenes = api::measurable(api::Scene(options.scene), options.settings, "lobatto tradeoff");
     const Scene& scene = scenes.changed;
     end_of(scene);
     const std::string folder = output_folder(options.output, result_name(scene.path) + ".tradeoff");
@@ -112,8 +111,8 @@ void add_tradeoff(CommandLine& program) {
     command.option("-o,--output", options->output, "Folder of the results (default: out/NAME.tradeoff)")
         .shown_as("FOLDER");
     options->budget.add_to(command);
-    add_until_option(command, options->overrides);
-    add_set_option(command, options->overrides);
+    add_until_option(command, options->settings);
+    add_set_option(command, options->settings);
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto tradeoff scenes/pendulum.toml --budget 10s");
     command.does([options] { tradeoff(*options); });

@@ -9,7 +9,7 @@
 #include "cli/commands/commands.hpp"
 #include "cli/options/budget.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/say.hpp"
@@ -25,7 +25,7 @@ struct TuneOptions {
     std::string scene;
     std::string error;
     BudgetOption budget;
-    Overrides overrides;
+    api::Settings settings;
     bool write = false, json = false;
 };
 
@@ -60,7 +60,7 @@ void tune(const TuneOptions& options) {
     const api::Scene scene(options.scene);
     if (std::error_code none; options.write && !std::filesystem::is_regular_file(options.scene, none))
         throw InputError(fmt::format("--write: {} is no file that can be written; leave --write out", options.scene));
-    if (options.write && !options.overrides.set.empty())
+    if (options.write && !options.settings.set.empty())
         throw InputError("--write: the file has other values than --set; change them there, then leave --set out");
     const Interruption interruption;
     Say say(options.budget.seconds());
@@ -70,10 +70,10 @@ void tune(const TuneOptions& options) {
     request.interrupted = interruption.flag();
     request.say = [&](const std::string& what) { say(what); };
     try {
-        const auto [changed, choice] = api::choice_for(scene, settings_of({}, options.overrides), request);
+        const auto [changed, choice] = api::choice_for(scene, options.settings, request);
         say.clear();
         if (!options.json) print(choice, changed, error);
-        if (options.write) write_method(choice, changed, error, !options.overrides.until.empty());
+        if (options.write) write_method(choice, changed, error, !options.settings.until.empty());
         if (options.json)
             fmt::print("{}", json_of_choice(choice, changed, error, options.write));
         else if (options.write)
@@ -94,9 +94,9 @@ void add_tune(CommandLine& program) {
     command.option("--error", options->error, "The largest error to the end, relative to the amplitude of the motion")
         .shown_as("ERROR")
         .required();
-    add_until_option(command, options->overrides);
+    add_until_option(command, options->settings);
     options->budget.add_to(command);
-    add_set_option(command, options->overrides);
+    add_set_option(command, options->settings);
     command.flag("--write", options->write, "Write the method and the step into the scene file");
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto tune scenes/pendulum.toml --error 1e-8 --until 1000");

@@ -5,9 +5,8 @@
 #include <algorithm>
 
 #include "cli/commands/commands.hpp"
-#include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/say.hpp"
 #include "library/whole.hpp"
@@ -19,12 +18,11 @@ namespace {
 
 struct VerifyOptions {
     std::string scene;
-    MethodOption method;
-    Overrides overrides;
+    api::Settings settings;
     bool json = false;
 };
 
-void print(const std::vector<ProofRow>& rows, const Convergence& convergence) {
+void print(const std::vector<ProofRow>& rows, const MeasuredOrder& convergence) {
     std::size_t widest = 0;
     for (const ProofRow& row : rows) widest = std::max(widest, row.claim.size());
     fmt::print("  {:<{}}  {:>16}  {:>10}\n", "claim", widest, "measured", "bound");
@@ -36,14 +34,14 @@ void print(const std::vector<ProofRow>& rows, const Convergence& convergence) {
     if (convergence.rows.empty()) return;
     fmt::print("\nThe error over {:.4g} time units, in quadruple precision:\n  {:>12}  {:>12}  {:>6}\n",
                convergence.duration, "step", "error", "order");
-    for (const ConvergenceRow& row : convergence.rows)
+    for (const OrderRow& row : convergence.rows)
         fmt::print("  {:>12.6g}  {:>12.3e}  {:>6}\n", row.step, row.error,
                    &row == &convergence.rows.front() ? "" : fmt::format("{:.2f}", row.order));
 }
 
 void verify(const VerifyOptions& options) {
     Say say;
-    const Proof proof = api::proof_of(api::Scene(options.scene), settings_of(options.method, options.overrides),
+    const Proof proof = api::proof_of(api::Scene(options.scene), options.settings,
                                       [&](const std::string& what, double done) { say(what, done); });
     say.clear();
     if (options.json) {
@@ -64,9 +62,9 @@ void add_verify(CommandLine& program) {
         program.command("verify", "Check a scene's equations, its emitted code and the promises of its integrator");
     const auto options = std::make_shared<VerifyOptions>();
     command.option("SCENE", options->scene, "Scene file").required();
-    options->method.add_to(command);
-    add_set_option(command, options->overrides);
-    add_step_option(command, options->overrides);
+    add_method_options(command, options->settings);
+    add_set_option(command, options->settings);
+    add_step_option(command, options->settings);
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto verify scenes/pendulum.toml --points 3");
     command.does([options] { verify(*options); });

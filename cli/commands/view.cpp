@@ -8,9 +8,8 @@
 #include <sstream>
 
 #include "cli/commands/commands.hpp"
-#include "cli/options/method.hpp"
 #include "cli/options/output_path.hpp"
-#include "cli/options/overrides.hpp"
+#include "cli/options/settings.hpp"
 #include "cli/print/answers_json.hpp"
 #include "cli/print/interruption.hpp"
 #include "cli/print/progress.hpp"
@@ -36,19 +35,13 @@ struct ViewCommand {
     std::vector<std::string> beside;
     std::string output;  // empty: out/NAME.html
     std::string video;   // empty: none
-    MethodOption method;
-    Overrides overrides;
+    api::Settings settings;
     bool quiet = false, json = false;
 };
 
-// One more run of the scene: "points=2 step=0.1".
-struct Beside {
-    MethodChoice method;
-    std::string step;
-};
-
-Beside beside_of(const std::string& text) {
-    Beside beside;
+// What differs in one more run of the scene, "points=2 step=0.1": a method, a step.
+api::Settings beside_of(const std::string& text) {
+    api::Settings beside;
     std::istringstream words(text);
     std::set<std::string> keys;
     for (std::string word; words >> word;) {
@@ -69,11 +62,11 @@ Beside beside_of(const std::string& text) {
             return count;
         };
         if (key == "points")
-            beside.method.points = number();
+            beside.points = number();
         else if (key == "stages")
-            beside.method.stages = number();
+            beside.stages = number();
         else if (key == "splitting")
-            beside.method.splitting = number();
+            beside.splitting = number();
         else if (key == "step" && !value.empty())
             beside.step = value;
         else
@@ -86,22 +79,21 @@ Beside beside_of(const std::string& text) {
     return beside;
 }
 
-// The method of `options`, unless this names another.
-MethodChoice method_of(const Beside& beside, const MethodChoice& options, const api::Scene& scene) {
-    MethodChoice method = options;
-    if (beside.method.member()) {
-        method.points = beside.method.points;
-        method.stages = beside.method.stages;
-        method.splitting = beside.method.splitting;
-        if (method.splitting) method.tolerance.reset();  // it iterates nothing
+// The settings of that run.
+api::Settings settings_beside(const api::Settings& beside, api::Settings settings, const api::Scene& scene) {
+    if (!beside.step.empty()) settings.step = beside.step;
+    if (beside.points || beside.stages || beside.splitting) {
+        settings.points = beside.points;
+        settings.stages = beside.stages;
+        settings.splitting = beside.splitting;
+        if (settings.splitting) settings.tolerance.reset();  // it iterates nothing
     }
     try {
-        Scene other = scene.parts().scene;
-        method.apply(other);
+        api::with_method(scene, settings);
     } catch (const InputError& error) {
         throw InputError(std::string("--beside: ") + error.what());
     }
-    return method;
+    return settings;
 }
 
 std::vector<Viewed> motions_of(const ViewCommand& options) {
@@ -117,18 +109,13 @@ std::vector<Viewed> motions_of(const ViewCommand& options) {
     };
     for (const std::string& path : options.scenes) {
         const api::Scene scene(path);
-        const auto add = [&](const MethodChoice& method, const Overrides& overrides, bool is_alone) {
+        const auto add = [&](const api::Settings& settings, bool is_alone) {
             progress.reset();
-            all.push_back(
-                viewed_motion(scene, settings_of(method, overrides), is_alone, numbers_on_page / count, show_progress));
+            all.push_back(viewed_motion(scene, settings, is_alone, numbers_on_page / count, show_progress));
         };
-        add(options.method, options.overrides, options.scenes.size() > 1 || options.beside.empty());
-        for (const std::string& text : options.beside) {
-            const Beside beside = beside_of(text);
-            Overrides overrides = options.overrides;
-            if (!beside.step.empty()) overrides.step = beside.step;
-            add(method_of(beside, options.method, scene), overrides, false);
-        }
+        add(options.settings, options.scenes.size() > 1 || options.beside.empty());
+        for (const std::string& text : options.beside)
+            add(settings_beside(beside_of(text), options.settings, scene), false);
     }
     return all;
 }
@@ -212,10 +199,10 @@ void add_view(CommandLine& program) {
         .option("--video", options->video,
                 "Also the first 20 seconds as a video, .mp4 or .gif; needs chromium and ffmpeg")
         .shown_as("FILE");
-    options->method.add_to(command);
-    add_step_option(command, options->overrides);
-    add_until_option(command, options->overrides);
-    add_set_option(command, options->overrides);
+    add_method_options(command, options->settings);
+    add_step_option(command, options->settings);
+    add_until_option(command, options->settings);
+    add_set_option(command, options->settings);
     command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto view scenes/double_pendulum.toml --beside points=2 -o pendulum.html");

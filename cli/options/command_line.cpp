@@ -193,6 +193,15 @@ Option Command::option(const std::string& name, std::optional<double>& target, c
     return Option(app_->add_option(name, target, help)).checked_by(any_number_complaint);
 }
 
+Option Command::option(const std::string& name, std::function<void(const std::string&)> take, const std::string& help) {
+    return Option(app_->add_option_function<std::vector<std::string>>(
+        name,
+        [take = std::move(take)](const std::vector<std::string>& values) {
+            for (const std::string& value : values) take(value);
+        },
+        help));
+}
+
 Option Command::choice_of(const std::string& name, std::function<void(int)> store,
                           const std::vector<std::pair<std::string, int>>& words, const std::string& help) {
     const std::map<std::string, int> table(words.begin(), words.end());
@@ -205,6 +214,10 @@ Option Command::choice_of(const std::string& name, std::function<void(int)> stor
 
 Option Command::flag(const std::string& name, bool& target, const std::string& help) {
     return Option(app_->add_flag(name, target, help));
+}
+
+Option Command::flag(const std::string& name, std::function<void()> is_given, const std::string& help) {
+    return Option(app_->add_flag_callback(name, std::move(is_given), help));
 }
 
 void Command::footer(const std::string& text) {

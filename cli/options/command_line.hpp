@@ -55,6 +55,8 @@ public:
     Option option(const std::string& name, std::optional<std::int64_t>& target, const std::string& help);
     Option option(const std::string& name, double& target, const std::string& help);
     Option option(const std::string& name, std::optional<double>& target, const std::string& help);
+    // Each value given goes to `take`.
+    Option option(const std::string& name, std::function<void(const std::string&)> take, const std::string& help);
     // One of some words, each of which stands for a value.
     template <class Enum>
     Option choice(const std::string& name, Enum& target, const std::vector<std::pair<std::string, Enum>>& words,
@@ -65,6 +67,7 @@ public:
             name, [&target](int value) { target = static_cast<Enum>(value); }, numbers, help);
     }
     Option flag(const std::string& name, bool& target, const std::string& help);
+    Option flag(const std::string& name, std::function<void()> is_given, const std::string& help);
 
     void footer(const std::string& text);  // the end of its help
     void does(std::function<void()> work);

@@ -122,7 +122,7 @@ std::string json_of_proof(const std::string& scene, const Proof& proof) {
                                     {"decided", row.measured != "not decided"},
                                     {"holds", row.holds}});
     answer["convergence"] = Answer::array();
-    for (const ConvergenceRow& row : proof.convergence.rows)
+    for (const OrderRow& row : proof.convergence.rows)
         answer["convergence"].push_back({{"step", number(row.step)},
                                          {"error", number(row.error)},
                                          {"order", row.order > 0 ? number(row.order) : Answer(nullptr)}});

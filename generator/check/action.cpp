@@ -71,7 +71,7 @@ public:
         slopes_of_L();
         second_derivatives();
         slopes_of_the_action();
-        if (derivation_.structure.form() == Form::general) {
+        if (derivation_.structure.form() == StepForm::general) {
             if (system_.constraints.empty()) routhian();
         } else {
             stage_equations();
@@ -113,7 +113,7 @@ private:
         Symbols z = system_.v;
         std::vector<GiNaC::ex> g = system_.momentum;
         SparseMatrix H;
-        if (derivation_.structure.form() == Form::general) {
+        if (derivation_.structure.form() == StepForm::general) {
             const Routhian& routhian = derivation_.structure.routhian();
             z = routhian.z;
             g = routhian.gradient;

@@ -294,7 +294,7 @@ std::vector<Check> check_equations(const Derivation& derivation) {
     const bool written_out = is_written_out(derivation.system, derivation.quadrature);
     std::vector<Check> checks;
     if (written_out) checks = WrittenOut(derivation).run();
-    if (!written_out || derivation.structure.form() == Form::general)
+    if (!written_out || derivation.structure.form() == StepForm::general)
         for (const Check& check : check_action(derivation)) checks.push_back(check);
     return checks;
 }

@@ -99,7 +99,7 @@ public:
         slopes_of_L();
         if (structure.looped) {
             repeated_terms();
-        } else if (structure.form() == Form::general) {
+        } else if (structure.form() == StepForm::general) {
             general();
         } else {
             mass_ = formulas_(entries(system_.mass.dense()));
@@ -116,7 +116,7 @@ public:
 
     // Whether the step itself is a program.
     static bool is_stepped(const Derivation& derivation) {
-        return derivation.structure.form() == Form::linear_map && derivation.system.n == 1 &&
+        return derivation.structure.form() == StepForm::linear_map && derivation.system.n == 1 &&
                !derivation.quadrature.is_explicit();
     }
 
@@ -302,7 +302,7 @@ private:
 
     // Formulas applied to the rows of their tables, added up as the loops of a kernel add them.
     void repeated_terms() {
-        const bool general = derivation_.structure.form() == Form::general;
+        const bool general = derivation_.structure.form() == StepForm::general;
         const std::vector<GiNaC::symbol>& variables = general ? derivation_.structure.routhian().z : system_.q;
         const Numbers z = values_of(variables);
         machine_.set("q", values_of(system_.q));

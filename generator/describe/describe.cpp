@@ -12,7 +12,7 @@ DescriptionWriter::DescriptionWriter(const Derivation& derivation)
       s_(static_cast<std::size_t>(derivation.quadrature.points)),
       controls_(derivation.quadrature.control.size()),
       lobatto_(derivation.quadrature.method.family == Family::lobatto),
-      general_(derivation.structure.form() == Form::general),
+      general_(derivation.structure.form() == StepForm::general),
       written_out_(!derivation.quadrature.is_explicit() && is_written_out(derivation.system, derivation.quadrature)),
       is_paper_scheme_(lobatto_ && s_ == 4 && n_ == 1 && !general_) {
     for (const Coordinate& coordinate : d_.scene.coordinates) {
@@ -58,7 +58,7 @@ Description Describer::run() {
         general_step();
     } else if (written_out_) {
         if (lobatto_) full_system();
-        if (d_.structure.form() == Form::linear_map && n_ == 1)
+        if (d_.structure.form() == StepForm::linear_map && n_ == 1)
             propagation_of_one();
         else
             reduced_system();

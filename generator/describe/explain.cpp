@@ -31,7 +31,7 @@ bool has_linear_terms(const System& system) {
 // Points of a step where positions are unknown: of a general step all control points but the first.
 int unknown_points(const Derivation& d) {
     if (d.structure.is_explicit()) return 0;
-    if (d.structure.form() != Form::general) return d.quadrature.points - 2;
+    if (d.structure.form() != StepForm::general) return d.quadrature.points - 2;
     return d.scene.method.family == Family::lobatto ? d.scene.method.points - 1 : d.scene.method.points;
 }
 
@@ -81,13 +81,13 @@ std::string kind_of(const Derivation& derivation) {
 std::string form_of(const Derivation& derivation) {
     const int points = unknown_points(derivation);
     switch (derivation.structure.form()) {
-        case Form::linear_map:
+        case StepForm::linear_map:
             return "none: one matrix maps positions and momenta to those of the next step";
-        case Form::separable:
+        case StepForm::separable:
             if (points == 0) return "none: the end of a step follows explicitly from its start";
             return fmt::format("for the positions at {} inside the step; its end follows from them",
                                points_text(points));
-        case Form::general:
+        case StepForm::general:
             return points == 1 ? "for the positions at the end of the step"
                                : fmt::format(
                                      "for the positions at {} after the start of the step, the last of them its "
@@ -103,10 +103,15 @@ int unknowns_of(const Derivation& derivation) {
     return unknowns;
 }
 
+const char* word_of(MatrixOfStep matrix) {
+    static constexpr const char* words[] = {"nothing to solve", "full matrix", "banded matrix"};
+    return words[static_cast<int>(matrix)];
+}
+
 std::vector<GroupSolve> solves_of(const Derivation& derivation) {
     const Structure& structure = derivation.structure;
-    if (structure.form() == Form::linear_map) return {};
-    const bool general = structure.form() == Form::general;
+    if (structure.form() == StepForm::linear_map) return {};
+    const bool general = structure.form() == StepForm::general;
     const int points = unknown_points(derivation);
     // One multiplier a cyclic coordinate with Lobatto: its momentum may sway within a step.
     const int multipliers = general && derivation.scene.method.family == Family::lobatto
@@ -127,9 +132,9 @@ std::vector<GroupSolve> solves_of(const Derivation& derivation) {
         const bool free =
             !general && std::none_of(structure.constant_mass().entries.begin(), structure.constant_mass().entries.end(),
                                      [&](const auto& e) { return e.first == group.coordinates.front(); });
-        solve.method = free || solve.unknowns == 0        ? "nothing to solve"
-                       : 3 * solve.band >= solve.unknowns ? "full matrix"
-                                                          : "banded matrix";
+        solve.matrix = free || solve.unknowns == 0        ? MatrixOfStep::none
+                       : 3 * solve.band >= solve.unknowns ? MatrixOfStep::full
+                                                          : MatrixOfStep::banded;
         if (solve.unknowns > 0) solves.push_back(solve);
     }
     return solves;
@@ -140,8 +145,8 @@ long elimination_of(const Derivation& derivation) {
     long multiplications = 0;
     for (const GroupSolve& solve : solves_of(derivation)) {
         const long N = solve.unknowns, band = solve.band;
-        if (solve.method == "nothing to solve") continue;
-        if (solve.method == "banded matrix")
+        if (solve.matrix == MatrixOfStep::none) continue;
+        if (solve.matrix == MatrixOfStep::banded)
             multiplications += (factored ? 0 : 2 * N * band * band) + 3 * N * band;
         else
             multiplications += (factored ? 0 : N * N * N / 3) + N * N;
@@ -155,10 +160,9 @@ std::string solver_text(const Derivation& derivation) {
     const auto words = [](const GroupSolve& solve) {
         const std::string equations =
             solve.unknowns == 1 ? "one equation" : fmt::format("{} equations", solve.unknowns);
-        if (solve.method == "nothing to solve")
+        if (solve.matrix == MatrixOfStep::none)
             return std::string("no equations, because no force depends on the positions inside a step");
-        if (solve.method == "closed formula") return equations + ", by a closed formula";
-        if (solve.method == "full matrix") return equations + ", as a full matrix";
+        if (solve.matrix == MatrixOfStep::full) return equations + ", as a full matrix";
         return fmt::format("{}, as a band of {} diagonals", equations, 2 * solve.band + 1);
     };
     std::vector<std::pair<std::string, std::vector<int>>> kinds;  // groups solved alike, together
@@ -170,7 +174,7 @@ std::string solver_text(const Derivation& derivation) {
     }
     const bool has_fixed_point =
         !derivation.structure.full() && (derivation.system.constraints.empty() || derivation.system.constant_mass) &&
-        (derivation.structure.form() == Form::separable || derivation.system.n <= most_iterated ||
+        (derivation.structure.form() == StepForm::separable || derivation.system.n <= most_iterated ||
          has_light_mass(derivation.scene, derivation.system, derivation.structure));
     std::string text = derivation.structure.linear ? "once per step, without iteration: "
                        : has_fixed_point

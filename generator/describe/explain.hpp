@@ -9,12 +9,15 @@
 
 namespace lobatto {
 
+enum class MatrixOfStep { none, full, banded };
+const char* word_of(MatrixOfStep matrix);  // "nothing to solve", "full matrix", "banded matrix"
+
 // Equations that are solved together.
 struct GroupSolve {
     std::vector<int> coordinates;  // indices in the scene; behind its coordinates the multipliers of its constraints
     int unknowns = 0;
-    int band = 0;        // of the matrix, on either side of its diagonal; unknowns - 1 when it is full
-    std::string method;  // "closed formula", "full matrix", "banded matrix"; "nothing to solve"
+    int band = 0;  // of the matrix, on either side of its diagonal; unknowns - 1 when it is full
+    MatrixOfStep matrix = MatrixOfStep::none;
 };
 
 // "Kinetic minus potential energy, with constant masses."

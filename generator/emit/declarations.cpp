@@ -148,8 +148,8 @@ const std::vector<Declaration>& general() {
 
 }  // namespace
 
-const std::vector<Declaration>& declarations(Form form) {
-    return form == Form::general ? general() : separable();
+const std::vector<Declaration>& declarations(StepForm form) {
+    return form == StepForm::general ? general() : separable();
 }
 
 // Constants, types and functions of every form that are not in the tables above.
@@ -246,14 +246,15 @@ const std::set<std::string>& member_names() {
 }
 
 bool is_member_name(const std::string& name) {
-    const auto is_function = [&](Form form) {
+    const auto is_function = [&](StepForm form) {
         return std::any_of(declarations(form).begin(), declarations(form).end(),
                            [&](const Declaration& declaration) { return declaration.program == name; });
     };
     // Those of measured values (generator/formula/spline.hpp).
     const bool is_table = name.starts_with("table_") && name.size() == 13 &&
                           name.find_first_not_of("0123456789abcdef", 6) == std::string::npos;
-    return is_table || member_names().contains(name) || is_function(Form::separable) || is_function(Form::general);
+    return is_table || member_names().contains(name) || is_function(StepForm::separable) ||
+           is_function(StepForm::general);
 }
 
 }  // namespace lobatto

@@ -21,7 +21,7 @@ struct Declaration {
     bool any_number = false;  // a template on the type of its values: one state, or many side by side
 };
 
-const std::vector<Declaration>& declarations(Form form);
+const std::vector<Declaration>& declarations(StepForm form);
 
 // A struct cannot have the name of one of its members.
 const std::set<std::string>& member_names();  // the constants and types

@@ -138,7 +138,7 @@ private:
     // prepare() and the loops call their own.
     void reserve_names() {
         for (const Input& input : graph_.inputs()) taken_.insert(input.code.substr(0, input.code.find('[')));
-        for (const Form form : {Form::separable, Form::general})
+        for (const StepForm form : {StepForm::separable, StepForm::general})
             for (const Declaration& declaration : declarations(form))
                 for (const auto& [type, name] : declaration.parameters) taken_.insert(name);
         taken_.insert({"k", "p", "h", "time", "rows", "how", "Status"});

@@ -108,9 +108,9 @@ bool has_hybrid_stepper(const Scene& scene) {
     return !scene.watched().empty() && !scene.clock;
 }
 
-std::string tolerance_setting(const Scene& scene, Form form) {
+std::string tolerance_setting(const Scene& scene, StepForm form) {
     const double tolerance = scene.method.tolerance;
-    if (tolerance == 0 || form == Form::linear_map) return "";
+    if (tolerance == 0 || form == StepForm::linear_map) return "";
     return has_hybrid_stepper(scene) ? fmt::format("set_tolerance({})", tolerance)
                                      : fmt::format("tolerance = {}", tolerance);
 }

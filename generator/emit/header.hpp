@@ -23,6 +23,6 @@ std::string header(const Derivation& derivation, const KernelSource& source, con
 bool has_hybrid_stepper(const Scene& scene);
 // "tolerance = 1e-06": how a program asks its stepper for the tolerance of the scene. Empty: nothing is iterated to
 // one.
-std::string tolerance_setting(const Scene& scene, Form form);
+std::string tolerance_setting(const Scene& scene, StepForm form);
 
 }  // namespace lobatto

@@ -79,12 +79,12 @@ private:
     bool is_put_in_place(const Declaration& declaration) const {
         const std::string name = declaration.program;
         if (name == "stage") return takes_angles(declaration);
-        return d_.structure.form() == Form::separable && !d_.structure.looped &&
+        return d_.structure.form() == StepForm::separable && !d_.structure.looped &&
                (name == "node" || name == "minus_acceleration") && optimised_.cost_of_node <= 200;
     }
 
     std::string costs() const {
-        if (d_.structure.form() != Form::separable) return "";
+        if (d_.structure.form() != StepForm::separable) return "";
         const bool uses_hessian = optimised_.uses_hessian;
         return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr bool uses_hessian = {};", uses_hessian),
                            uses_hessian ? "forces are evaluated less often for having second derivatives"
@@ -93,10 +93,11 @@ private:
 
     // Whether `stage` is written out, in packs of double: where angles may be near others.
     bool has_near_angles() const {
-        return d_.structure.form() == Form::general && !d_.structure.looped && options_.precision == Precision::double_;
+        return d_.structure.form() == StepForm::general && !d_.structure.looped &&
+               options_.precision == Precision::double_;
     }
     std::string near_angles() const {
-        if (d_.structure.form() != Form::general) return "";
+        if (d_.structure.form() != StepForm::general) return "";
         const std::string comment = angles_.empty()
                                         ? "stage computes all its sines and cosines anew"
                                         : "whose sines and cosines stage is given, anew or from those of angles near";
@@ -322,7 +323,7 @@ private:
         return d_.structure.neighbours() && has_lanes(options_.precision) &&
                std::string(declaration.program) == "minus_acceleration";
     }
-    bool is_map() const { return d_.structure.form() == Form::linear_map; }
+    bool is_map() const { return d_.structure.form() == StepForm::linear_map; }
 
     const Derivation& d_;
     const OptimisedPrograms& optimised_;

@@ -13,7 +13,7 @@ namespace lobatto {
 
 struct Derivation;
 struct OptimisedPrograms;
-enum class Form;
+enum class StepForm;
 
 struct EmitOptions {
     Precision precision = Precision::double_;
@@ -22,7 +22,7 @@ struct EmitOptions {
 };
 
 struct KernelSource {
-    Form form{};       // of its steps (generator/mechanics/structure/structure.hpp)
+    StepForm form{};   // of its steps (generator/mechanics/structure/structure.hpp)
     std::string name;  // struct lobatto::kernels::NAME, a C identifier
     // The struct without the values of the scene: what is compiled to run. Starts, steps and values of parameters that
     // ask for the same formulas share it.

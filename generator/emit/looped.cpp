@@ -33,7 +33,7 @@ LoopedText::LoopedText(const Derivation& derivation, const Programs& programs, P
       precision_(precision),
       style_{precision, Phase::step_size, true, false, Notation::cpp, {}},
       names_(std::move(names)),
-      general_(derivation.structure.form() == Form::general),
+      general_(derivation.structure.form() == StepForm::general),
       neighbours_(derivation.structure.neighbours() && has_lanes(precision)),
       elements_(static_cast<int>(derivation.structure.elements.repeated.size())) {}
 

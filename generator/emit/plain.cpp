@@ -259,7 +259,7 @@ public:
     }
 
 private:
-    bool is_general() const { return d_.structure.form() == Form::general; }
+    bool is_general() const { return d_.structure.form() == StepForm::general; }
     bool autonomous() const { return d_.system.autonomous; }
 
     std::string preamble() const {

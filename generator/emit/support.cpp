@@ -16,8 +16,8 @@ namespace {
 // Where the Stepper of a kernel is; as stepping_of in runtime/kernel/base/contract.hpp.
 std::string stepper_of(const Scene& scene, const Structure& structure) {
     if (scene.clock) return "steppers/clocked.hpp";
-    if (structure.form() == Form::linear_map) return "steppers/linear.hpp";
-    if (structure.form() == Form::general) return "steppers/general.hpp";
+    if (structure.form() == StepForm::linear_map) return "steppers/linear.hpp";
+    if (structure.form() == StepForm::general) return "steppers/general.hpp";
     return structure.clean()         ? "steppers/clean.hpp"
            : structure.is_explicit() ? "steppers/splitting.hpp"
                                      : "steppers/separable.hpp";

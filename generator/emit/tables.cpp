@@ -59,7 +59,7 @@ std::string separable_shapes(const Structure& structure, const System& system, i
     line(text, fmt::format("int points = {}", nodes), "nodes of a step, both ends included");
     line(text, fmt::format("bool is_explicit = {}", structure.is_explicit()),
          structure.is_explicit() ? "kicks and drifts in turn" : "the inner nodes are solved for");
-    if (structure.form() == Form::separable) {
+    if (structure.form() == StepForm::separable) {
         line(text, fmt::format("bool diagonal_part = {}", structure.diagonal_part()),
              structure.diagonal_part() ? "taken into the stage map: the constant part of M^-1 V''"
                                        : "nothing is taken into the stage map");
@@ -262,8 +262,8 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     const int controls = static_cast<int>(d.quadrature.control.size());
     const bool multiplier = d.scene.method.family == Family::lobatto;
     const int unknowns =
-        structure.form() == Form::linear_map || structure.is_explicit() ? 0
-        : structure.form() == Form::separable
+        structure.form() == StepForm::linear_map || structure.is_explicit() ? 0
+        : structure.form() == StepForm::separable
             ? d.system.n * (d.quadrature.points - 2)
             : static_cast<int>(structure.routhian().active.size() + d.system.constraints.size()) * (controls - 1) +
                   (multiplier ? static_cast<int>(structure.routhian().cyclic.size()) : 0);
@@ -285,7 +285,7 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
     line(text, fmt::format("bool has_energy = {}", d.scene.has_energy()), "asked for by the scene");
     line(text, fmt::format("bool has_tangent = {}", has_tangent(d)), "the derivative of a step");
-    if (structure.form() == Form::general)
+    if (structure.form() == StepForm::general)
         line(text, fmt::format("bool clocked = {}", d.scene.clock.has_value()),
              d.scene.clock ? "steps are equally long in tau, dt = clock(q) dtau" : "steps are equally long in time");
     if (d.scene.has_time_coordinate())
@@ -302,10 +302,10 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
         line(text, fmt::format("int first_input = {}", first - all.begin()), "which are one after another");
     }
     text += watched_shapes(d.scene);
-    if (structure.form() == Form::general) return text + general_shapes(d) + order_of_unknowns(structure);
+    if (structure.form() == StepForm::general) return text + general_shapes(d) + order_of_unknowns(structure);
     text += separable_shapes(structure, d.system, d.quadrature.points, precision);
     text += has_full_matrix(d) ? full_places("entry", d.system.n) : places("entry", structure.constant_mass().entries);
-    const bool solves = structure.form() == Form::separable && !structure.is_explicit();
+    const bool solves = structure.form() == StepForm::separable && !structure.is_explicit();
     return solves ? text + order_of_unknowns(structure) : text;
 }
 
@@ -333,11 +333,11 @@ std::string tables(const Derivation& d, Precision precision) {
                table.vector("b", rule.b, "kicks at the nodes") +
                table.vector("drift_length", drifts, "between neighbouring nodes");
     }
-    if (d.structure.form() != Form::general) {
+    if (d.structure.form() != StepForm::general) {
         std::string text = "\n" + table.vector("c", rule.c, "nodes on [0, 1]") +
                            table.vector("b", rule.b, "their weights") +
                            table.matrix("A", rule.A, "stage map A_ij over the interior nodes");
-        if (d.structure.form() == Form::separable)
+        if (d.structure.form() == StepForm::separable)
             text +=
                 table.matrix("E", rule.E, "extrapolation from the nodes of one step to the interior nodes of the next");
         return text;

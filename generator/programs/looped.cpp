@@ -20,13 +20,13 @@ using GiNaC::ex;
 
 // Of the second derivatives.
 std::size_t variables_of(const Derivation& derivation) {
-    return static_cast<std::size_t>(derivation.system.n) * (derivation.structure.form() == Form::general ? 2 : 1);
+    return static_cast<std::size_t>(derivation.system.n) * (derivation.structure.form() == StepForm::general ? 2 : 1);
 }
 
 class LoopedBuilder : public ProgramBuilder {
 public:
     explicit LoopedBuilder(const Derivation& derivation)
-        : ProgramBuilder(derivation), general_(derivation.structure.form() == Form::general) {
+        : ProgramBuilder(derivation), general_(derivation.structure.form() == StepForm::general) {
         std::size_t e = 0;
         if (general_) {
             for (const auto& [place, value] : d_.structure.routhian().second.entries()) entry_[place] = e++;
@@ -211,8 +211,8 @@ bool has_full_matrix(const Derivation& derivation) {
     constexpr std::size_t fewest = 32;
     const Structure& structure = derivation.structure;
     const std::size_t variables = variables_of(derivation);
-    const std::size_t entries = structure.form() == Form::general ? structure.routhian().second.entries().size()
-                                                                  : structure.constant_mass().entries.size();
+    const std::size_t entries = structure.form() == StepForm::general ? structure.routhian().second.entries().size()
+                                                                      : structure.constant_mass().entries.size();
     return variables >= fewest && entries == variables * variables;
 }
 

@@ -107,7 +107,8 @@ void ProgramBuilder::impacts() {
 Programs build_programs(const Derivation& derivation) {
     if (derivation.structure.looped) return looped_programs(derivation);
     if (!derivation.system.unwritten.empty()) throw std::logic_error("terms that are not written out, and no loops");
-    return derivation.structure.form() == Form::general ? general_programs(derivation) : separable_programs(derivation);
+    return derivation.structure.form() == StepForm::general ? general_programs(derivation)
+                                                            : separable_programs(derivation);
 }
 
 namespace {
@@ -134,7 +135,7 @@ double cost_of(const Programs& programs, const Structure& structure, const std::
 // Whether second derivatives save more evaluations than they cost: with them a step takes an evaluation less, about,
 // and five products for each of them (measured).
 bool hessian_pays(const Programs& programs, const Structure& structure) {
-    if (structure.form() == Form::general) return false;
+    if (structure.form() == StepForm::general) return false;
     const double evaluation = cost_of(programs, structure, "minus_acceleration", LoopPart::Of::slope),
                  with_slopes = cost_of(programs, structure, "node", LoopPart::Of::node);
     return with_slopes + 5 * static_cast<double>(structure.constant_mass().entries.size()) <= 2 * evaluation;

@@ -57,7 +57,7 @@ public:
     Programs build() {
         prepare();
         mechanics();
-        if (d_.structure.form() == Form::linear_map) {
+        if (d_.structure.form() == StepForm::linear_map) {
             if (n_ == 1) propagation_of_one();
         } else if (d_.structure.diagonal_part() || d_.structure.absorbed()) {
             quadratic_part();

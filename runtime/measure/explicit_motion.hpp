@@ -2,7 +2,7 @@
 // The motion by explicit extrapolation, which shares no formula with a step: what checks of steps may be judged by.
 #pragma once
 
-#include "runtime/measure/convergence.hpp"
+#include "runtime/measure/measured_order.hpp"
 
 namespace lobatto {
 

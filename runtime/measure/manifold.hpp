@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "runtime/measure/convergence.hpp"
+#include "runtime/measure/measured_order.hpp"
 
 namespace lobatto {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "runtime/build/library.hpp"
-#include "runtime/measure/convergence.hpp"
+#include "runtime/measure/measured_order.hpp"
 
 namespace lobatto {
 

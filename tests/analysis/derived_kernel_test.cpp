@@ -85,14 +85,14 @@ TEST_CASE("what changes the kernel is derived anew") {
     CHECK_FALSE(derived_kernel(scene, {}).from_cache);
     CHECK(derived_kernel(scene, {}).from_cache);
     CHECK_FALSE(derived_kernel(scene, {Precision::quadruple}).from_cache);
-    CHECK_FALSE(derived_kernel(scene, {Precision::double_, true}).from_cache);
+    CHECK_FALSE(derived_kernel(scene, {Precision::double_, Shortcuts::none}).from_cache);
     Scene other = scene;
     other.method.points = 6;
     CHECK_FALSE(derived_kernel(other, {}).from_cache);
     other = scene;
     other.outputs.energy = false;
     CHECK_FALSE(derived_kernel(other, {}).from_cache);
-    const KernelWish watched{Precision::double_, false, [](const Outline&) { return true; }};
+    const KernelWish watched{Precision::double_, Shortcuts::all, [](const Outline&) { return true; }};
     const DerivedKernel with_energy = derived_kernel(other, watched);
     CHECK_FALSE(with_energy.from_cache);
     CHECK(with_energy.outline.scene.outputs.energy);

@@ -49,7 +49,7 @@ bool has_diagonal_mass(const System& system) {
 }
 
 bool uses_scaled_mass(const Scene& scene, const System& system, const Structure& structure) {
-    return structure.form() == Form::general && !structure.full() && !structure.looped && !structure.linear &&
+    return structure.form() == StepForm::general && !structure.full() && !structure.looped && !structure.linear &&
            system.constraints.empty() && has_scaled_mass(scene, system);
 }
 

@@ -21,13 +21,13 @@ using GiNaC::ex;
 
 class Finder {
 public:
-    Finder(const Scene& scene, const System& system, const Quadrature& quadrature, bool general)
+    Finder(const Scene& scene, const System& system, const Quadrature& quadrature, Shortcuts shortcuts)
         : scene_(scene),
           system_(system),
           quadrature_(quadrature),
           n_(system.n),
           interior_(n_ * (quadrature.points - 2)) {
-        general_.full = general;
+        general_.full = shortcuts == Shortcuts::none;
     }
 
     std::pair<Structure, std::vector<Finding>> run() {
@@ -37,20 +37,20 @@ public:
         if (!scene_.is_cut()) result_.closed_solution = find_closed_solution(system_);
         findings_ = elimination_findings(scene_);
         choose_form();
-        if (form_ == Form::general)
+        if (form_ == StepForm::general)
             general();
         else
             separable();
         for (Finding& finding : scene_findings(scene_, system_)) findings_.push_back(std::move(finding));
         findings_.push_back(solution_finding(result_.closed_solution));
         switch (form_) {
-            case Form::linear_map:
+            case StepForm::linear_map:
                 result_.of_form = LinearMapForm{std::move(separable_)};
                 break;
-            case Form::separable:
+            case StepForm::separable:
                 result_.of_form = std::move(separable_);
                 break;
-            case Form::general:
+            case StepForm::general:
                 result_.of_form = std::move(general_);
                 break;
         }
@@ -65,7 +65,7 @@ private:
 
     void choose_form() {
         if (general_.full) {
-            form_ = Form::general;
+            form_ = StepForm::general;
             find("general path", true,
                  "asked for: no structure is used, and all nodes of a step are solved for with full matrices");
             return;
@@ -95,12 +95,12 @@ private:
         // The inverse of a full mass matrix is written out: few coordinates only, or nothing to solve.
         const bool takes_mass = separable_.diagonal_mass || interior_ <= full_mass_limit;
         if (!system_.separable || (!takes_mass && !separable_.is_explicit))
-            form_ = Form::general;
+            form_ = StepForm::general;
         else if (system_.linear && system_.autonomous && system_.inputs.empty() && n_ <= linear_map_limit &&
                  !polynomial_wanted && takes_mass)
-            form_ = Form::linear_map;
+            form_ = StepForm::linear_map;
         if (!separable_.is_explicit) return;
-        result_.linear = form_ == Form::linear_map;
+        result_.linear = form_ == StepForm::linear_map;
         find("explicit steps", true,
              "asked for: positions and velocities are updated in turn from node to node, without equations");
     }
@@ -159,7 +159,7 @@ private:
         for (const auto& [row, column] : separable_.entries) couplings.add(row, column);
         result_.groups = couplings.groups();
         if (!separable_.is_explicit) describe_groups();
-        if (form_ == Form::linear_map) return;
+        if (form_ == StepForm::linear_map) return;
         repetition();
         absorption();
         neighbourhood();
@@ -236,7 +236,7 @@ private:
     // Second derivatives that cancel between formulas have no place that a loop could add them to.
     bool has_places_of(const Elements& elements) const {
         std::vector<std::pair<int, int>> places = separable_.entries;
-        if (form_ == Form::general) {
+        if (form_ == StepForm::general) {
             places.clear();
             for (const auto& [place, value] : general_.routhian.second.entries()) places.push_back(place);
         }
@@ -250,8 +250,8 @@ private:
 
     // Terms of V, or of L, that are one formula of many variables.
     void repetition() {
-        const bool general = form_ == Form::general;
-        if (form_ == Form::linear_map || (!general && !separable_.diagonal_mass)) return;
+        const bool general = form_ == StepForm::general;
+        if (form_ == StepForm::linear_map || (!general && !separable_.diagonal_mass)) return;
         std::vector<ex> terms;
         std::vector<std::pair<int, ex>> forces;
         for (const ex& term : general ? system_.terms : all_at(system_.terms, system_.v, 0))
@@ -307,7 +307,7 @@ private:
 
     void linearity() {
         std::string reason = "all forces are linear, so a step is a product with one matrix, without iteration";
-        if (result_.linear && form_ != Form::linear_map)
+        if (result_.linear && form_ != StepForm::linear_map)
             reason = "all forces are linear, so one solve per step is exact, with a matrix that is factored once";
         if (separable_.is_explicit && system_.linear && !result_.linear) return;  // of no use
         if (!result_.linear) reason = curvature_text(system_);
@@ -315,9 +315,9 @@ private:
     }
 
     void describe_groups() {
-        if (n_ == 1 || (form_ == Form::general && general_.routhian.active.size() == 1)) return;
+        if (n_ == 1 || (form_ == StepForm::general && general_.routhian.active.size() == 1)) return;
         const std::size_t count = result_.groups.size();
-        const auto& in = form_ == Form::general ? general_.routhian.active : std::vector<int>{};
+        const auto& in = form_ == StepForm::general ? general_.routhian.active : std::vector<int>{};
         const auto listed = [&](const Group& group) {
             std::vector<int> coordinates;
             for (const int k : group.coordinates)
@@ -354,7 +354,7 @@ private:
     const System& system_;
     const Quadrature& quadrature_;
     const int n_, interior_;
-    Form form_ = Form::separable;
+    StepForm form_ = StepForm::separable;
     SeparableForm separable_;  // also what is known of a linear map
     GeneralForm general_;
     Structure result_;
@@ -364,20 +364,20 @@ private:
 }  // namespace
 
 const ConstantMassForm& Structure::constant_mass() const {
-    if (form() == Form::linear_map) return std::get<LinearMapForm>(of_form);
+    if (form() == StepForm::linear_map) return std::get<LinearMapForm>(of_form);
     return separable();
 }
 
 void Structure::iterate() {
-    if (form() != Form::linear_map) return;
+    if (form() != StepForm::linear_map) return;
     SeparableForm separable;
     static_cast<ConstantMassForm&>(separable) = std::get<LinearMapForm>(of_form);
     of_form = std::move(separable);
 }
 
 std::pair<Structure, std::vector<Finding>> find_structure(const Scene& scene, const System& system,
-                                                          const Quadrature& quadrature, bool general) {
-    return Finder(scene, system, quadrature, general).run();
+                                                          const Quadrature& quadrature, Shortcuts shortcuts) {
+    return Finder(scene, system, quadrature, shortcuts).run();
 }
 
 }  // namespace lobatto

@@ -57,7 +57,10 @@ struct GeneralForm {
     Routhian routhian;
     std::optional<Hamiltonian> hamiltonian;  // iterations take velocities and forces of momenta (D62)
 };
-enum class Form { linear_map, separable, general };  // in the order of Structure's variant
+enum class StepForm { linear_map, separable, general };  // in the order of Structure's variant
+
+// What the structure of a system lets a kernel leave out: all of it, or nothing (`--general`).
+enum class Shortcuts { all, none };
 
 struct Structure {
     std::variant<LinearMapForm, SeparableForm, GeneralForm> of_form;
@@ -67,7 +70,7 @@ struct Structure {
     std::vector<Group> groups;
     std::optional<ClosedSolution> closed_solution;
 
-    Form form() const { return static_cast<Form>(of_form.index()); }
+    StepForm form() const { return static_cast<StepForm>(of_form.index()); }
     // Of both forms with constant mass.
     const ConstantMassForm& constant_mass() const;
     const SeparableForm& separable() const { return std::get<SeparableForm>(of_form); }
@@ -76,12 +79,13 @@ struct Structure {
     // A linear map is taken as a separable step.
     void iterate();
     // Of any form: false where the form has no such thing.
-    bool is_explicit() const { return form() != Form::general && constant_mass().is_explicit; }
-    bool clean() const { return form() == Form::separable && separable().clean; }
-    bool neighbours() const { return form() == Form::separable && separable().neighbours; }
-    bool diagonal_part() const { return form() == Form::separable && separable().diagonal_part; }
-    bool absorbed() const { return form() == Form::separable && separable().absorbed; }
-    bool full() const { return form() == Form::general && std::get<GeneralForm>(of_form).full; }
+    bool is_explicit() const { return form() != StepForm::general && constant_mass().is_explicit; }
+    bool clean() const { return form() == StepForm::separable && separable().clean; }
+    bool neighbours() const { return form() == StepForm::separable && separable().neighbours; }
+    bool diagonal_part() const { return form() == StepForm::separable && separable().diagonal_part; }
+    bool absorbed() const { return form() == StepForm::separable && separable().absorbed; }
+    Shortcuts shortcuts() const { return full() ? Shortcuts::none : Shortcuts::all; }
+    bool full() const { return form() == StepForm::general && std::get<GeneralForm>(of_form).full; }
 };
 
 // Coordinates of a linear map; unknowns of a separable step whose constant mass matrix is full.
@@ -92,6 +96,7 @@ constexpr int looped_from = 32;
 // The findings are what the structure rests on, and what was looked for in vain, in words. `general`: find nothing, for
 // comparison.
 std::pair<Structure, std::vector<Finding>> find_structure(const Scene& scene, const System& system,
-                                                          const Quadrature& quadrature, bool general = false);
+                                                          const Quadrature& quadrature,
+                                                          Shortcuts shortcuts = Shortcuts::all);
 
 }  // namespace lobatto

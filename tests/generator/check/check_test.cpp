@@ -116,7 +116,7 @@ TEST_CASE("the equations of any Lagrangian hold for every method: forces, time, 
         for (const Derivation& derivation : {relativistic, spinning, driven(method)}) {
             const auto checks = check_equations(derivation);
             INFO(claims_of(checks));
-            CHECK(derivation.structure.form() == Form::general);
+            CHECK(derivation.structure.form() == StepForm::general);
             CHECK(checks.size() >= 7);
             CHECK(failures(checks) == Claims{});
         }
@@ -130,7 +130,7 @@ TEST_CASE("the equations of any Lagrangian hold for every method: forces, time, 
 }
 
 TEST_CASE("with structure off the equations are those of the general form, and hold") {
-    const Derivation derivation = derive(test::coupled_scene(4), true);
+    const Derivation derivation = derive(test::coupled_scene(4), Shortcuts::none);
     const auto checks = check_equations(derivation);
     CHECK(failures(checks) == Claims{});
     CHECK(claims_of(checks).find("Jacobian of the step against differences\n") != std::string::npos);

@@ -15,8 +15,8 @@
 #include "generator/method/splitting_order.hpp"
 #include "generator/method/splitting_stability.hpp"
 #include "generator/method/stability.hpp"
-#include "runtime/measure/convergence.hpp"
 #include "runtime/measure/diagnostics.hpp"
+#include "runtime/measure/measured_order.hpp"
 #include "tests/built_and_run.hpp"
 #include "tests/motions.hpp"
 #include "tests/support.hpp"
@@ -364,9 +364,9 @@ TEST_CASE("a linear system is one matrix, of few coordinates or of one") {
     for (const TestMotion* motion : {&harmonic_oscillator, &coupled_oscillators})
         for (const int stages : {6, 14}) {
             const Derivation derivation = derivation_of(*motion, splitting(stages));
-            CHECK(derivation.structure.form() == Form::linear_map);
+            CHECK(derivation.structure.form() == StepForm::linear_map);
             const Derivation composition = derivation_of(*motion, splitting(stages), "dense = 1");
-            CHECK(composition.structure.form() == Form::separable);
+            CHECK(composition.structure.form() == StepForm::separable);
             CHECK(distance(after(compiled(derivation), *motion, 0.3, 100),
                            after(compiled(composition), *motion, 0.3, 100)) < 1e-12);
         }

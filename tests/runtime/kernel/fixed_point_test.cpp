@@ -188,7 +188,7 @@ TEST_CASE("steps by fixed-point iteration are those of Newton's iteration, in fl
 TEST_CASE("steps by fixed-point iteration are those of the general path") {
     for (const Motion* motion : {&pendulum, &kepler}) {
         const Derivation derivation = derivation_of(*motion, lobatto_4, plain),
-                         general = derivation_of(*motion, lobatto_4, plain, true);
+                         general = derivation_of(*motion, lobatto_4, plain, Shortcuts::none);
         const auto a = path<double>(kernel_in_own_cache(derivation, Precision::double_), *motion, motion->step, 200);
         const auto b = path<double>(kernel_in_own_cache(general, Precision::double_), *motion, motion->step, 200);
         const auto c = path<double>(newton_kernel(general, Precision::double_), *motion, motion->step, 200);
@@ -232,11 +232,11 @@ TEST_CASE("a coordinate at rest far from zero takes no accuracy from the others"
 }
 
 TEST_CASE("formulas go along neighbouring coordinates where these stand in rows, and only there") {
-    const auto claims = [](const Motion& motion, const char* output = "", bool general = false) {
-        return derivation_of(motion, lobatto_4, output, general).structure.neighbours();
+    const auto claims = [](const Motion& motion, const char* output = "", Shortcuts shortcuts = Shortcuts::all) {
+        return derivation_of(motion, lobatto_4, output, shortcuts).structure.neighbours();
     };
     CHECK(claims(lattice()));
-    CHECK_FALSE(claims(lattice(), "", true));
+    CHECK_FALSE(claims(lattice(), "", Shortcuts::none));
     CHECK_FALSE(claims(pendulum));
     Motion scattered = lattice();  // each coupled to the one 7 times as far round the ring: nobody's neighbour
     scattered.body =

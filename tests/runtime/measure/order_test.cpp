@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "runtime/error.hpp"
-#include "runtime/measure/convergence.hpp"
 #include "runtime/measure/diagnostics.hpp"
+#include "runtime/measure/measured_order.hpp"
 #include "runtime/measure/promises.hpp"
 #include "runtime/measure/reference.hpp"
 #include "tests/scenes/scenes.hpp"
@@ -70,7 +70,7 @@ TEST_CASE("the order is 2, 4, 6, 8 for s = 2 ... 5 with two coordinates and a ma
           doctest::test_suite("slow")) {
     for (int points = 2; points <= 5; ++points) {
         const Kernel kernel = quadruple_kernel(test::coupled_scene(points));
-        const Convergence convergence = measure_order(kernel, coupled_start, 0.1);
+        const MeasuredOrder convergence = measure_order(kernel, coupled_start, 0.1);
         REQUIRE(convergence.rows.size() >= 3);
         CHECK(convergence.settled);
         CHECK(std::fabs(convergence.order - (2 * points - 2)) < 0.05);
@@ -123,7 +123,7 @@ void check_order(const Motion& motion, const Method& method) {
         q.push_back(scene.evaluate(scene.initial_position[k], "q").to_double());
         velocity.push_back(scene.evaluate(scene.initial_rate[k], "v").to_double());
     }
-    const Convergence convergence = measure_order(kernel, {{}, q, stepper.momentum(0, q, velocity)}, 0.2);
+    const MeasuredOrder convergence = measure_order(kernel, {{}, q, stepper.momentum(0, q, velocity)}, 0.2);
     INFO(motion.name << ", " << method.name() << ": order " << convergence.order << ", settled " << convergence.settled
                      << ", errors from " << (convergence.rows.empty() ? 0.0 : convergence.rows.front().error));
     CHECK(!convergence.exact);
@@ -164,11 +164,11 @@ TEST_CASE("and so has every member, up to Lobatto's order 22 and Gauss's 20" * d
 }
 
 TEST_CASE("a Stoermer-Verlet kernel does not pass for one of order 4, nor a kernel of order 6 for one of order 4") {
-    const Convergence verlet = measure_order(quadruple_kernel(test::pendulum_scene(2)), wide_swing, 0.1);
+    const MeasuredOrder verlet = measure_order(quadruple_kernel(test::pendulum_scene(2)), wide_swing, 0.1);
     CHECK(bears_out(verlet, 2, false));
     CHECK(!bears_out(verlet, 4, false));
     CHECK(!bears_out(verlet, 4, true));
-    const Convergence sixth = measure_order(quadruple_kernel(test::pendulum_scene(4)), wide_swing, 0.1);
+    const MeasuredOrder sixth = measure_order(quadruple_kernel(test::pendulum_scene(4)), wide_swing, 0.1);
     CHECK(bears_out(sixth, 6, false));
     CHECK(!bears_out(sixth, 4, false));
     CHECK(bears_out(sixth, 4, true));  // a linear system may converge faster
@@ -176,7 +176,7 @@ TEST_CASE("a Stoermer-Verlet kernel does not pass for one of order 4, nor a kern
 
 TEST_CASE("high orders may still rise, and weakly nonlinear motions converge faster; other orders do not pass") {
     const auto measured = [](std::vector<double> orders) {
-        Convergence convergence;
+        MeasuredOrder convergence;
         convergence.settled = true;
         convergence.order = orders.back();
         for (const double order : orders) convergence.rows.push_back({0, 0, order});
@@ -194,14 +194,14 @@ TEST_CASE("high orders may still rise, and weakly nonlinear motions converge fas
 }
 
 TEST_CASE("a ladder that begins far too coarse is refined until the orders settle") {
-    const Convergence convergence = measure_order(quadruple_kernel(test::pendulum_scene(3)), wide_swing, 40);
+    const MeasuredOrder convergence = measure_order(quadruple_kernel(test::pendulum_scene(3)), wide_swing, 40);
     CHECK(convergence.settled);
     CHECK(convergence.rows.front().step < 40);
     CHECK(std::fabs(convergence.order - 4) < 0.1);
 }
 
 TEST_CASE("a ladder that begins at the rounding floor is coarsened until there is an error to measure") {
-    const Convergence pendulum = measure_order(quadruple_kernel(test::pendulum_scene(5)), wide_swing, 1e-4);
+    const MeasuredOrder pendulum = measure_order(quadruple_kernel(test::pendulum_scene(5)), wide_swing, 1e-4);
     CHECK(pendulum.settled);
     CHECK(pendulum.rows.front().step > 1e-4);
     CHECK(std::fabs(pendulum.order - 8) < 0.3);
@@ -212,7 +212,7 @@ TEST_CASE("a ladder that begins at the rounding floor is coarsened until there i
 
 TEST_CASE("an order that rounding hides at every step is not judged") {
     // Around q = 1e20 quadruple leaves 14 digits to an angle: steps short enough for them show nothing but rounding.
-    const Convergence convergence =
+    const MeasuredOrder convergence =
         measure_order(quadruple_kernel(test::pendulum_scene(5)), {{1, 1}, {1e20}, {2}}, 1e-6);
     INFO(convergence.order);
     CHECK(!convergence.settled);
@@ -224,7 +224,7 @@ TEST_CASE("an order that rounding hides at every step is not judged") {
 TEST_CASE("free fall has no error to measure") {
     const Kernel kernel = quadruple_kernel(
         test::scene_of("m*q'^2/2 - m*g*q", "q = { position = 0, velocity = 0 }", 4, "m = 2\ng = 9.81"));
-    const Convergence convergence = measure_order(kernel, {{2, 9.75}, {0}, {1}}, 0.1);
+    const MeasuredOrder convergence = measure_order(kernel, {{2, 9.75}, {0}, {1}}, 0.1);
     CHECK(convergence.exact);
     CHECK(convergence.rows.empty());
     CHECK(bears_out(convergence, 6, true));

@@ -80,8 +80,8 @@ long operations(const Derivation& derivation) {
     return emit(derivation).report.back().after.total();
 }
 
-std::string header(const Scene& scene, bool general = false) {
-    return emit(derive(scene, general)).header;
+std::string header(const Scene& scene, Shortcuts shortcuts = Shortcuts::all) {
+    return emit(derive(scene, shortcuts)).header;
 }
 
 const std::string run = "[run]\nstep = 0.05\nuntil = 1\n";
@@ -91,7 +91,7 @@ const std::string run = "[run]\nstep = 0.05\nuntil = 1\n";
 TEST_CASE("a linear system's map takes the general path's steps without iterating") {
     for (const char* name : {"coupled_oscillators", "harmonic_oscillator"}) {
         const Scene linear = library(name);
-        const Motion map = motion(derive(linear), 193), general = motion(derive(linear, true), 193);
+        const Motion map = motion(derive(linear), 193), general = motion(derive(linear, Shortcuts::none), 193);
         CHECK(finding(derive(linear), "linear system").holds);
         CHECK(distance(map, general) < 1e-12);  // measured 2e-14
         CHECK(map.unknowns == 0);
@@ -103,7 +103,7 @@ TEST_CASE("a linear system's map takes the general path's steps without iteratin
 TEST_CASE("a constant mass matrix leaves only the interior nodes to solve") {
     for (const char* name : {"pendulum", "henon_heiles", "toda_lattice"}) {
         const Scene constant = library(name);
-        const Derivation shortcut = derive(constant), whole = derive(constant, true);
+        const Derivation shortcut = derive(constant), whole = derive(constant, Shortcuts::none);
         const Motion reduced = motion(shortcut, 100), general = motion(whole, 100);
         CHECK(distance(reduced, general) < 1e-12);  // measured at most 2e-14
         const int n = static_cast<int>(constant.coordinates.size()), s = constant.method.points;
@@ -130,7 +130,7 @@ TEST_CASE("masses that all change alike leave no matrix of a node to factor" * d
         INFO(row.energy);
         const Scene whole = with_kinetic_energy(row.energy);
         const Derivation derivation = derive(whole);
-        REQUIRE(derivation.structure.form() == Form::general);
+        REQUIRE(derivation.structure.form() == StepForm::general);
         CHECK(uses_scaled_mass(whole, derivation.system, derivation.structure) == row.is_scaled);
         CHECK(finding(derivation, "scaled mass matrix").holds == row.is_scaled);
         CHECK(has_light_mass(whole, derivation.system, derivation.structure) == row.is_light);
@@ -142,7 +142,7 @@ TEST_CASE("masses that all change alike leave no matrix of a node to factor" * d
             INFO(method);
             const Scene whole = with_kinetic_energy(energy, method);
             const Motion shortcut = motion(derive(whole), 100);
-            CHECK(distance(shortcut, motion(derive(whole, true), 100)) < 1e-12);
+            CHECK(distance(shortcut, motion(derive(whole, Shortcuts::none), 100)) < 1e-12);
         }
 }
 
@@ -153,7 +153,7 @@ TEST_CASE("independent groups are solved by themselves, with fewer operations") 
     const Scene joined = scene("lagrangian = \"a'^2/2 + b'^2/2 + cos(a) - b^4/4 - a*b/1000\"\n" + coordinates + run);
     CHECK(finding(derive(apart), "independent groups").holds);
     CHECK_FALSE(finding(derive(joined), "independent groups").holds);
-    CHECK(distance(motion(derive(apart), 100), motion(derive(apart, true), 100)) < 1e-13);
+    CHECK(distance(motion(derive(apart), 100), motion(derive(apart, Shortcuts::none), 100)) < 1e-13);
     CHECK(emit(derive(apart)).header.find("int group_count = 2;") != std::string::npos);
     CHECK(emit(derive(joined)).header.find("int group_count = 1;") != std::string::npos);
 }
@@ -170,7 +170,7 @@ TEST_CASE("large independent groups are solved apart") {
     const Scene two = scene("lagrangian = \"" + lagrangian + "\"\n" + coordinates + run);
     const Derivation derivation = derive(two);
     REQUIRE(derivation.structure.groups.size() == 2);
-    CHECK(distance(motion(derivation, 100), motion(derive(two, true), 100)) < 1e-13);
+    CHECK(distance(motion(derivation, 100), motion(derive(two, Shortcuts::none), 100)) < 1e-13);
     CHECK(emit(derivation).header.find("group_first[3] = {0, 3, 6}") != std::string::npos);
 }
 
@@ -184,7 +184,7 @@ TEST_CASE("cyclic coordinates leave the solve, their momenta stay to the last bi
             if (row.cyclic.size() > 1 && method.family == Family::gauss) continue;  // nothing new, and long to compile
             Scene cyclic = library(row.name);
             cyclic.method = method;
-            const Derivation shortcut = derive(cyclic), whole = derive(cyclic, true);
+            const Derivation shortcut = derive(cyclic), whole = derive(cyclic, Shortcuts::none);
             CHECK(finding(shortcut, "cyclic coordinates").holds);
             REQUIRE(shortcut.structure.routhian().cyclic.size() == row.cyclic.size());
             const Motion reduced = motion(shortcut, 100), general = motion(whole, 100);
@@ -241,7 +241,7 @@ TEST_CASE("a coordinate that nothing holds moves uniformly beside a nonlinear on
         run);
     CHECK(finding(derive(free), "cyclic coordinates").holds);
     const Motion shortcut = motion(derive(free), 100);
-    CHECK(distance(shortcut, motion(derive(free, true), 100)) < 1e-13);
+    CHECK(distance(shortcut, motion(derive(free, Shortcuts::none), 100)) < 1e-13);
     CHECK(shortcut.p[1] == 2.0);
 }
 
@@ -251,7 +251,7 @@ TEST_CASE("banded and repeated equations give the motion of full matrices") {
         CHECK(finding(shortcut, "banded equations").holds);
         CHECK(finding(shortcut, "repeated terms").holds);
         if (std::string(name) == "fput_beta")  // 256 masses with full matrices take too long for a test
-            CHECK(distance(motion(shortcut, 50), motion(derive(library(name), true), 50)) < 1e-12);
+            CHECK(distance(motion(shortcut, 50), motion(derive(library(name), Shortcuts::none), 50)) < 1e-12);
     }
 }
 
@@ -261,7 +261,7 @@ TEST_CASE("a chain with the fewest nodes takes the general path's steps") {
     for (const Method& method : {Method{Family::lobatto, 2}, Method{Family::lobatto, 3}, Method{Family::gauss, 1}}) {
         CAPTURE(method.name());
         chain.method = method;
-        CHECK(distance(motion(derive(chain), 20), motion(derive(chain, true), 20)) < 1e-13);
+        CHECK(distance(motion(derive(chain), 20), motion(derive(chain, Shortcuts::none), 20)) < 1e-13);
     }
 }
 
@@ -271,7 +271,7 @@ TEST_CASE("positions and velocities of one formula are told apart in the energy 
         "[coordinates]\nx = { count = 12, position = \"i/10\", velocity = 0.5 }\n" +
         run);
     const Derivation derivation = derive(squares);
-    REQUIRE(derivation.structure.form() == Form::general);
+    REQUIRE(derivation.structure.form() == StepForm::general);
     REQUIRE(derivation.structure.looped);
     LoadedStepper<double> stepper(test::kernel_in_own_cache(derivation, Precision::double_));
     REQUIRE(stepper.prepare({}, 0.05) == LOBATTO_OK);
@@ -293,7 +293,7 @@ TEST_CASE("derivatives of a repeated term that are equal and opposite several ti
         run);
     const Derivation shortcut = derive(shear);
     REQUIRE(shortcut.structure.looped);
-    CHECK(distance(motion(shortcut, 50), motion(derive(shear, true), 50)) < 1e-12);
+    CHECK(distance(motion(shortcut, 50), motion(derive(shear, Shortcuts::none), 50)) < 1e-12);
 }
 
 TEST_CASE("a formula without a value at zero is no fixed end") {
@@ -304,7 +304,7 @@ TEST_CASE("a formula without a value at zero is no fixed end") {
     const Derivation shortcut = derive(quotients);
     REQUIRE(shortcut.structure.neighbours());
     CHECK_FALSE(shortcut.structure.separable().fixed_ends.before);
-    CHECK(distance(motion(shortcut, 50), motion(derive(quotients, true), 50)) < 1e-12);
+    CHECK(distance(motion(shortcut, 50), motion(derive(quotients, Shortcuts::none), 50)) < 1e-12);
 }
 
 TEST_CASE("steps of a chain do not depend on the unit of length, a power of two") {
@@ -333,7 +333,7 @@ TEST_CASE("a linear chain in loops takes the general path's steps with one corre
     const Derivation shortcut = derive(chain(40));
     CHECK(shortcut.structure.linear);
     CHECK(shortcut.structure.looped);
-    const Motion reduced = motion(shortcut, 50), general = motion(derive(chain(40), true), 50);
+    const Motion reduced = motion(shortcut, 50), general = motion(derive(chain(40), Shortcuts::none), 50);
     CHECK(distance(reduced, general) < 1e-12);
     CHECK(reduced.result.iterations == 50);
 }
@@ -359,7 +359,8 @@ TEST_CASE("formulas without time are not given it, and those with it are") {
     CHECK(still.find("number time") == std::string::npos);
     const Scene driven = scene("time = \"t\"\nlagrangian = \"q'^2/2 + (1 + sin(t)/5)*cos(q)\"\n" + coordinates + run);
     CHECK(header(driven).find("number time") != std::string::npos);
-    CHECK(distance(motion(derive(driven), 100), motion(derive(driven, true), 100)) < 1e-11);  // measured 3e-13
+    CHECK(distance(motion(derive(driven), 100), motion(derive(driven, Shortcuts::none), 100)) <
+          1e-11);  // measured 3e-13
 }
 
 TEST_CASE("constant parameters are folded: fewer fields, no more operations") {
@@ -407,9 +408,9 @@ TEST_CASE("diagonal mass and sparse second derivatives leave fewer operations th
         const Scene sparse = library(name);
         std::size_t entries = derive(sparse).structure.constant_mass().entries.size();
         const std::size_t n = sparse.coordinates.size();
-        if (derive(sparse).structure.form() == Form::general)
+        if (derive(sparse).structure.form() == StepForm::general)
             entries = derive(sparse).structure.routhian().second.entries().size();
-        CHECK(entries <= (derive(sparse).structure.form() == Form::general ? 4 : 1) * n * n);
+        CHECK(entries <= (derive(sparse).structure.form() == StepForm::general ? 4 : 1) * n * n);
     }
     CHECK(derive(library("stiff_fput")).structure.constant_mass().entries.size() < 36);
 }
@@ -420,7 +421,7 @@ TEST_CASE("a force that jumps is not taken for a constant one") {
         const Scene jumps = scene("lagrangian = \"" + std::string(lagrangian) + "\"\n" + start);
         const Derivation derivation = derive(jumps);
         CHECK_FALSE(derivation.structure.linear);
-        CHECK(distance(motion(derivation, 20), motion(derive(jumps, true), 20)) < 1e-13);
+        CHECK(distance(motion(derivation, 20), motion(derive(jumps, Shortcuts::none), 20)) < 1e-13);
     }
     // Dry friction: the velocity 0.2 falls by 0.1 a unit of time.
     const Scene friction = scene("lagrangian = \"x'^2/2\"\n" + start + "[forces]\nx = \"-x'/sqrt(x'^2)/10\"\n");
@@ -444,5 +445,5 @@ TEST_CASE("a driven chain absorbs only what does not depend on the time") {
         "velocity = 0 }\n[parameters]\nn = { value = 40, constant = true }\n" +
         run);
     CHECK(derive(driven).structure.looped);
-    CHECK(distance(motion(derive(driven), 20), motion(derive(driven, true), 20)) < 1e-12);
+    CHECK(distance(motion(derive(driven), 20), motion(derive(driven, Shortcuts::none), 20)) < 1e-12);
 }

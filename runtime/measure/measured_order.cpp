@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The order of convergence of a kernel on a given motion, measured in quadruple precision on a ladder of steps.
-#include "runtime/measure/convergence.hpp"
+#include "runtime/measure/measured_order.hpp"
 
 #include <algorithm>
 #include <array>
@@ -96,11 +96,11 @@ double rounding_error(const States& reference, const QuadrupleStart& start, int 
 
 }  // namespace
 
-Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, double step, double least) {
+MeasuredOrder measure_order(const Kernel& kernel, const QuadrupleStart& start, double step, double least) {
     LoadedStepper<Quadruple> stepper(kernel);
     const auto& ladder = kernel->order > high_order ? near_ones : halvings;
     const int reference_ratio = ladder.back() * finest_ratio;
-    Convergence best;
+    MeasuredOrder best;
     bool below_rounding = false;
     double least_change = std::numeric_limits<double>::infinity();  // between the last two orders of a ladder
     Quadruple coarse = step;
@@ -111,7 +111,7 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
             continue;
         }
         const double rounding = std::fmax(least, rounding_error(*reference, start, reference_ratio));
-        Convergence measured;
+        MeasuredOrder measured;
         measured.duration = static_cast<double>(coarse_steps * coarse);
         bool too_coarse = false;
         for (const int ratio : ladder) {
@@ -120,7 +120,7 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
                 too_coarse = true;
                 continue;
             }
-            ConvergenceRow row{static_cast<double>(coarse) / ratio, error_of(*states, *reference, start), 0};
+            OrderRow row{static_cast<double>(coarse) / ratio, error_of(*states, *reference, start), 0};
             if (row.error < rounding) break;
             if (!measured.rows.empty())
                 row.order =
@@ -141,7 +141,7 @@ Convergence measure_order(const Kernel& kernel, const QuadrupleStart& start, dou
         measured.order = measured.rows.back().order;
         const double change = std::fabs(measured.order - measured.rows[count - 2].order);
         measured.settled = change < std::fmax(0.1, measured.order / 30);
-        const auto is_flat = [](const ConvergenceRow& row) {
+        const auto is_flat = [](const OrderRow& row) {
             return row.error < flat_error && std::fabs(row.order) < flat_order;
         };
         measured.exact = std::all_of(measured.rows.begin(), measured.rows.end(), is_flat);
@@ -159,7 +159,7 @@ namespace {
 
 // By how much the orders of a ladder may still rise: by as much as they last did, where that is a high order's and less
 // than before.
-double still_to_come(const std::vector<ConvergenceRow>& rows, int order) {
+double still_to_come(const std::vector<OrderRow>& rows, int order) {
     if (order <= high_order || rows.size() < 4) return 0;  // the first row has no order
     const auto from_end = [&](std::size_t i) { return rows[rows.size() - i].order; };
     const double change = from_end(1) - from_end(2), before = from_end(2) - from_end(3);
@@ -168,7 +168,7 @@ double still_to_come(const std::vector<ConvergenceRow>& rows, int order) {
 
 }  // namespace
 
-bool bears_out(const Convergence& convergence, int order, bool linear) {
+bool bears_out(const MeasuredOrder& convergence, int order, bool linear) {
     if (convergence.exact || convergence.below_rounding) return true;
     const double below = std::fmax(0.3, order / 30.0) + still_to_come(convergence.rows, order),
                  above = std::fmax(0.3, order / 15.0);
