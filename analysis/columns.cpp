@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "generator/mechanics/algebra/sample.hpp"
@@ -96,7 +97,10 @@ void ColumnFormulas::evaluate(const std::vector<double>& parameters, double time
     variables.push_back(time);
     for (const std::vector<double>* part : {&q, &velocity})
         variables.insert(variables.end(), part->begin(), part->begin() + coordinates_);
-    for (const Tape& tape : tapes_) *values++ = tape(variables);
+    for (const Tape& tape : tapes_) {
+        const double value = tape(variables);
+        *values++ = std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;  // which has no sign then
+    }
 }
 
 std::vector<std::pair<std::string, std::string>> names_beside(const Scene& scene) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The columns of a trajectory that are formulas: eliminated coordinates, and what bodies do.
+// The columns of a trajectory that are formulas: those of the scene, eliminated coordinates, and what bodies do.
 #pragma once
 
 #include <mutex>

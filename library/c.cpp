@@ -159,6 +159,15 @@ int lobatto_integrator_start_from_velocity(lobatto_integrator* integrator, doubl
         stepper.start_from_velocity(t, q, velocity);
     });
 }
+int lobatto_integrator_start_with_inputs(lobatto_integrator* integrator, double t, const double* q, const double* p,
+                                         const double* inputs) {
+    return with_stepper(integrator, [&](api::Stepper& stepper) {
+        require(q, "q");
+        require(p, "p");
+        require(inputs, "inputs");
+        stepper.start(t, q, p, inputs);
+    });
+}
 int lobatto_integrator_advance(lobatto_integrator* integrator, int64_t steps) {
     return with_stepper(integrator, [&](api::Stepper& stepper) { return stepper.advance(steps); });
 }

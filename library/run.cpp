@@ -61,6 +61,7 @@ Trajectory begun(const OpenedRun& run) {
     trajectory.method = run.scene().method.name();
     trajectory.digest = run.prepared().source.digest;
     trajectory.step = run.request().step;
+    trajectory.dense = run.request().dense;
     return trajectory;
 }
 

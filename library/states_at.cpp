@@ -27,8 +27,9 @@ std::pair<std::vector<double>, std::vector<double>> states_at(Stepper stepper, c
         if (!(time >= first - rounding && time <= last + rounding))
             throw InputError(fmt::format("t = {:.9g} is outside the trajectory, which leads from {:.9g} to {:.9g}",
                                          time, first, last));
-        const auto from =
+        auto from =
             static_cast<std::size_t>(std::upper_bound(run.t.begin(), run.t.end(), time + rounding) - run.t.begin() - 1);
+        if (from + 1 < run.t.size()) from -= from % static_cast<std::size_t>(run.dense + 1);  // the last ends a step
         const bool is_row = time - run.t[from] <= rounding;
         if (begun != from || is_row || stepper.t() > time) {
             stepper.start(run.t[from], run.q.data() + from * n, run.p.data() + from * n);

@@ -31,6 +31,8 @@ struct Stepper::Parts {
     std::int64_t chain_steps = 0;  // since the start
     std::vector<double> chain;     // t, q, p at the end of the last of them
 
+    enum class Rate { momentum, velocity };
+
     explicit Parts(const Kernel& of) : kernel(of), stepper(of.parts().kernel) {
         const TrajectoryRequest& start = kernel.parts().start;
         parameters = start.parameters;
@@ -92,21 +94,32 @@ struct Stepper::Parts {
         taken = chain_steps = 0;
         restart();
     }
-    // Where no motion can begin, the stepper stays where it was.
-    void begin_at(double t, const std::vector<double>& position, const std::vector<double>& momentum) {
+    // Where no motion can begin, the stepper stays where it was. `inputs`: null where they stay.
+    void begin_at(double t, const double* position, const double* rate, Rate kind, const double* inputs) {
+        const bool has_velocity = kind == Rate::velocity;
+        require_finite(t, position, "the position of", rate, has_velocity ? "the velocity of" : "the momentum of");
         const double time_before = time;
-        const std::vector<double> q_before = q, p_before = p;
+        const std::vector<double> q_before = q, p_before = p, parameters_before = parameters;
+        std::vector<double> begin(position, position + n()), momentum(rate, rate + n());
+        if (inputs != nullptr) parameters = with_inputs(inputs);
         try {
-            go_on_from(t, position, momentum);
+            if (has_velocity) {
+                if (inputs != nullptr) prepare();
+                momentum = momentum_of_start(stepper, t, begin, momentum);
+            }
+            go_on_from(t, begin, momentum);
         } catch (...) {
+            parameters = parameters_before;
             go_on_from(time_before, q_before, p_before);
             throw;
         }
     }
+    void prepare() {
+        if (const lobatto_status status = stepper.prepare(parameters, step); status != LOBATTO_OK) fail(status, {});
+    }
     void restart() {
-        lobatto_status status = stepper.prepare(parameters, step);
-        if (status == LOBATTO_OK) status = stepper.start(time, q, p);
-        if (status != LOBATTO_OK) fail(status, {});
+        prepare();
+        if (const lobatto_status status = stepper.start(time, q, p); status != LOBATTO_OK) fail(status, {});
         if (is_clocked()) stepper.state(time, q, p);  // where the time is a coordinate, the kernel sets it
         origin = time;
         stop_ahead.reset();
@@ -114,19 +127,31 @@ struct Stepper::Parts {
         std::erase_if(found, [&](const EventHit& hit) { return time < hit.t; });
     }
 
+    bool are_inputs(std::size_t first, std::size_t count) const {
+        const lobatto_kernel& table = stepper.kernel().table();
+        const auto begin = static_cast<std::size_t>(table.first_input);
+        return first >= begin && first + count <= begin + static_cast<std::size_t>(table.inputs);
+    }
+    // The parameters, with these from `first` on.
+    std::vector<double> with(std::size_t first, const std::vector<double>& values) const {
+        std::vector<double> after = parameters;
+        std::copy(values.begin(), values.end(), after.begin() + static_cast<std::ptrdiff_t>(first));
+        for (std::size_t i = first; are_inputs(first, values.size()) && i < first + values.size(); ++i)
+            if (std::fabs(after[i]) < least_parameter) after[i] = 0;  // a control loop that has come to rest
+        check_change(kernel.parts().required, after, first, values.size());
+        return after;
+    }
+    std::vector<double> with_inputs(const double* values) const {
+        const lobatto_kernel& table = stepper.kernel().table();
+        return with(static_cast<std::size_t>(table.first_input), {values, values + table.inputs});
+    }
+
     // Parameters from `first` on; where the kernel refuses them, those of before.
     void change(std::size_t first, const std::vector<double>& values) {
-        const std::vector<double> before = parameters;
-        std::vector<double> after = before;
-        std::copy(values.begin(), values.end(), after.begin() + static_cast<std::ptrdiff_t>(first));
+        const std::vector<double> before = parameters, after = with(first, values);
+        const bool are_inputs = this->are_inputs(first, values.size());
         const lobatto_kernel& table = stepper.kernel().table();
-        const auto begin = static_cast<std::size_t>(table.first_input),
-                   end = begin + static_cast<std::size_t>(table.inputs);
-        const bool are_inputs = first >= begin && first + values.size() <= end;
-        for (std::size_t i = first; are_inputs && i < first + values.size(); ++i)
-            if (std::fabs(after[i]) < least_parameter) after[i] = 0;  // a control loop that has come to rest
         if (after == before) return;
-        check_change(kernel.parts().required, after, first, values.size());
         parameters = after;
         const double step_before = last_step;
         const auto take = [&] {
@@ -325,20 +350,11 @@ double Stepper::step_size() const {
     return parts_->step;
 }
 
-void Stepper::start(double t, const double* q, const double* p) {
-    const std::size_t n = parts_->n();
-    guarded([&] {
-        parts_->require_finite(t, q, "the position of", p, "the momentum of");
-        parts_->begin_at(t, {q, q + n}, {p, p + n});
-    });
+void Stepper::start(double t, const double* q, const double* p, const double* inputs) {
+    guarded([&] { parts_->begin_at(t, q, p, Parts::Rate::momentum, inputs); });
 }
-void Stepper::start_from_velocity(double t, const double* q, const double* v) {
-    const std::size_t n = parts_->n();
-    guarded([&] {
-        parts_->require_finite(t, q, "the position of", v, "the velocity of");
-        const std::vector<double> position{q, q + n};
-        parts_->begin_at(t, position, momentum_of_start(parts_->stepper, t, position, {v, v + n}));
-    });
+void Stepper::start_from_velocity(double t, const double* q, const double* v, const double* inputs) {
+    guarded([&] { parts_->begin_at(t, q, v, Parts::Rate::velocity, inputs); });
 }
 
 bool Stepper::advance(std::int64_t steps) {

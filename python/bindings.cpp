@@ -146,14 +146,17 @@ bool advance_to(lob::Stepper& stepper, double t) {
     return unlocked([&] { return stepper.advance_to(t); });
 }
 
-void start(lob::Stepper& stepper, double t, const py::object& q, const py::object& p, const py::object& velocity) {
+void start(lob::Stepper& stepper, double t, const py::object& q, const py::object& p, const py::object& velocity,
+           const py::object& inputs) {
     if (p.is_none() == velocity.is_none()) throw lob::InputError("start: give p or velocity, one of them");
     const std::size_t n = stepper.coordinates();
     const Array position = whole(q, "q"), rate = p.is_none() ? whole(velocity, "velocity") : whole(p, "p");
+    const Array values = inputs.is_none() ? Array(0) : whole(inputs, "inputs");
+    const double* const given = inputs.is_none() ? nullptr : row_of(values, stepper.inputs(), "inputs");
     if (p.is_none())
-        stepper.start_from_velocity(t, row_of(position, n, "q"), row_of(rate, n, "velocity"));
+        stepper.start_from_velocity(t, row_of(position, n, "q"), row_of(rate, n, "velocity"), given);
     else
-        stepper.start(t, row_of(position, n, "q"), row_of(rate, n, "p"));
+        stepper.start(t, row_of(position, n, "q"), row_of(rate, n, "p"), given);
 }
 template <class Stepper, class Function, class... Arguments>
 auto alone(Stepper& stepper, Function function, const Arguments&... arguments) {
@@ -190,11 +193,12 @@ struct Freed {
 };
 
 std::pair<py::array, py::array> states_at(const lob::Stepper& stepper, const Array& t, const Array& q, const Array& p,
-                                          const Array& times) {
+                                          std::int64_t dense, const Array& times) {
     lob::Trajectory run;
     run.t = vector_of(t);
     run.q = vector_of(q);
     run.p = vector_of(p);
+    run.dense = dense;
     const std::vector<double> all = vector_of(times);
     auto states = unlocked([&] { return lob::states_at(stepper, run, all); });
     const auto columns = static_cast<py::ssize_t>(stepper.coordinates());
@@ -228,6 +232,7 @@ py::dict dict_of(lob::Trajectory&& run) {
     dict["method"] = run.method;
     dict["digest"] = run.digest;
     dict["step"] = run.step;
+    dict["dense"] = run.dense;
     dict["error"] = run.error;
     dict["largest_error"] = run.largest_error;
     dict["doubling"] = run.doubling;
@@ -432,11 +437,11 @@ void add_stepper(py::module_& module) {
             "Equal steps while they fit, then a shorter one that ends at t exactly.")
         .def(
             "start",
-            [](lob::Stepper& stepper, double t, const py::object& q, const py::object& p, const py::object& velocity) {
-                alone(stepper, &start, t, q, p, velocity);
-            },
+            [](lob::Stepper& stepper, double t, const py::object& q, const py::object& p, const py::object& velocity,
+               const py::object& inputs) { alone(stepper, &start, t, q, p, velocity, inputs); },
             py::arg("t"), py::arg("q"), py::arg("p") = py::none(), py::kw_only(), py::arg("velocity") = py::none(),
-            "Another place to go on from: positions, and momenta or velocities.")
+            py::arg("inputs") = py::none(),
+            "Another place to go on from: positions, and momenta or velocities; with other inputs, if given.")
         .def(
             "set",
             [](lob::Stepper& stepper, const std::string& name, double value) {

@@ -2,6 +2,7 @@
 // Tables of runs and sweeps, read back.
 #pragma once
 
+#include <algorithm>
 #include <fstream>
 #include <stdexcept>
 #include <string>
@@ -37,6 +38,15 @@ inline TrajectoryTable read_trajectory(const std::string& path) {
         }
     }
     return table;
+}
+
+inline std::vector<double> column_of(const TrajectoryTable& table, const std::string& name) {
+    const auto found = std::find(table.columns.begin(), table.columns.end(), name);
+    if (found == table.columns.end()) throw std::runtime_error("the table has no column " + name);
+    std::vector<double> values;
+    for (const std::vector<double>& row : table.rows)
+        values.push_back(row[static_cast<std::size_t>(found - table.columns.begin())]);
+    return values;
 }
 
 }  // namespace lobatto::test

@@ -124,7 +124,7 @@ std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request,
 
 }  // namespace
 
-PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, std::optional<Method> companion) {
+PreparedRun prepare_run(Scene scene, const Overrides& overrides, Shortcuts shortcuts, std::optional<Method> companion) {
     const Stopwatch watch;
     if (scene.clock && scene.method.numbers != Precision::double_)
         fail_at_clock(scene, "with a clock `lobatto run` computes in double, but numbers are \"" +
@@ -132,12 +132,12 @@ PreparedRun prepare_run(Scene scene, const Overrides& overrides, bool general, s
                                  "\"; remove the clock, or give --numbers double");
     const Precision numbers = scene.method.numbers;
     const DerivedKernel derived =
-        derived_kernel(scene, {numbers, general, EnergyWatch::can_watch}, nullptr, with_values(scene, overrides));
+        derived_kernel(scene, {numbers, shortcuts, EnergyWatch::can_watch}, nullptr, with_values(scene, overrides));
     const auto source_in = [&](Precision others, const Method& method) {
         Scene beside = scene;
         beside.method = method;
         const bool is_known = method.arithmetic == scene.method.arithmetic;
-        const KernelWish wish{others, general, EnergyWatch::can_watch};
+        const KernelWish wish{others, shortcuts, EnergyWatch::can_watch};
         return derived_kernel(beside, wish, is_known ? derived.derivation.get() : nullptr,
                               with_values(beside, overrides))
             .source;
@@ -211,37 +211,6 @@ std::vector<std::string> starts_at_jumps(const Scene& scene) {
     return texts;
 }
 
-// A kinetic energy that is not positive is allowed. With constant masses it is mostly a sign that was mistaken; others
-// are metrics such as those of relativity.
-std::vector<std::string> negative_masses(const PreparedRun& run, const TrajectoryRequest& request) {
-    std::vector<std::string> texts;
-    LoadedStepper<double> stepper(run.plain);
-    std::vector<double> velocity;
-    const std::vector<GiNaC::symbol> motion = run.outline.system.motion();
-    const auto entries = run.outline.system.momentum_v.entries();
-    const bool is_constant = std::none_of(entries.begin(), entries.end(), [&](const auto& entry) {
-        return std::any_of(motion.begin(), motion.end(), [&](const auto& symbol) { return entry.second.has(symbol); });
-    });
-    if (!is_constant || !run.scene.constraints.empty() ||
-        stepper.prepare(request.parameters, request.step) != LOBATTO_OK ||
-        stepper.start(request.time, request.q, request.p) != LOBATTO_OK ||
-        stepper.velocity(request.time, request.q, request.p, velocity) != LOBATTO_OK)
-        return texts;
-    const std::vector<double> momentum = stepper.momentum(request.time, request.q, velocity);
-    for (std::size_t k = 0; k < run.scene.coordinates.size(); ++k) {
-        std::vector<double> faster = velocity;
-        faster[k] += velocity[k] != 0 ? velocity[k] / 1024 : 0x1p-20;
-        const double change = stepper.momentum(request.time, request.q, faster)[k] - momentum[k];
-        if (change * (faster[k] - velocity[k]) < -0x1p-30 * std::fabs(momentum[k] * (faster[k] - velocity[k])))
-            texts.push_back(
-                fmt::format("the mass of {} is negative at the start: its momentum falls as its velocity "
-                            "grows. That is allowed, but mostly a mistaken sign in the Lagrangian",
-                            run.scene.coordinates[k].written));
-        if (!texts.empty()) break;
-    }
-    return texts;
-}
-
 // What a companion in the run's own numbers says, or a finer one, which sees all rounding; 0: nothing.
 double known_error(const PreparedRun& run, const std::optional<MeasuredError>& error) {
     if (run.finer || run.scene.method.numbers != Precision::double_ || !run.scene.constraints.empty())
@@ -288,7 +257,8 @@ RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, 
     for (const std::string& jump : jumps) verdict.warnings.push_back(jump);
     for (const std::string& text : starts_at_jumps(scene)) verdict.warnings.push_back(text);
     for (const std::string& text : degrees_in_sines(scene)) verdict.warnings.push_back(text);
-    for (const std::string& text : negative_masses(run, request)) verdict.warnings.push_back(text);
+    if (const std::string text = ConstantMasses(run.outline).complaint(request.parameters); !text.empty())
+        verdict.warnings.push_back(text + ". That is allowed, but mostly a mistaken sign in the Lagrangian");
     verdict.failure = failure_of(run, request, result, observers, departure);
     return verdict;
 }

@@ -11,6 +11,7 @@ Judges::Judges(const Scene& scene, const Outline& outline, const KernelSource& p
     : request_(request),
       watch_(outline, plain, plain_kernel, request),
       domains_(scene, outline.system),
+      masses_(outline),
       accepts_lost_(accepts_lost),
       algebra_(algebra) {
     if (measures) companion_.emplace(outline, kernel, plain_kernel, request);
@@ -18,6 +19,9 @@ Judges::Judges(const Scene& scene, const Outline& outline, const KernelSource& p
 
 Verdict Judges::judge(const EnsembleTrajectory& trajectory) {
     Verdict verdict{static_cast<int>(trajectory.status), std::nan("")};
+    EnsembleStart start;
+    request_.start(trajectory.index, start);
+    if (verdict.status == LOBATTO_NOT_FINITE && std::isnan(start.q.front())) verdict.status = undefined;
     if (verdict.status != LOBATTO_OK) return verdict;
     {
         const std::lock_guard lock(algebra_);
@@ -29,17 +33,24 @@ Verdict Judges::judge(const EnsembleTrajectory& trajectory) {
         verdict.interrupted = error.interrupted;
         if (error.lost && !accepts_lost_ && verdict.status == LOBATTO_OK) verdict.status = unresolved;
     }
-    if (!is_defined(trajectory)) verdict.status = undefined;
+    look_at_masses(trajectory.index, start.parameters);
+    if (!is_defined(trajectory, start)) verdict.status = undefined;
     if (verdict.status == LOBATTO_OK) watch_.observe(trajectory);
     return verdict;
 }
 
 // Whether formulas have values at the start and where states are kept, also those that kernels have lost.
-bool Judges::is_defined(const EnsembleTrajectory& trajectory) const {
-    EnsembleStart start;
-    request_.start(trajectory.index, start);
+bool Judges::is_defined(const EnsembleTrajectory& trajectory, const EnsembleStart& start) const {
     return domains_.hold_at_start(request_.time, start.parameters, start.q, start.rate) &&
            domains_.left_at(start.parameters, trajectory.kept) < 0;
+}
+
+void Judges::look_at_masses(std::int64_t trajectory, const std::vector<double>& parameters) {
+    std::string complaint = masses_.complaint(parameters);
+    if (complaint.empty()) return;
+    if (++not_positive_.count > 1) return;
+    not_positive_.first = trajectory;
+    not_positive_.complaint = std::move(complaint);
 }
 
 }  // namespace lobatto

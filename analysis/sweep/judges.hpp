@@ -8,6 +8,7 @@
 #include <string>
 
 #include "analysis/accuracy/companion/ensemble_companion.hpp"
+#include "analysis/accuracy/formulas/constant_masses.hpp"
 #include "analysis/accuracy/formulas/domains.hpp"
 #include "analysis/accuracy/watch/sweep_watch.hpp"
 #include "generator/emit/kernel.hpp"
@@ -53,13 +54,22 @@ public:
 
     // Of the steps that were looked at; empty: nothing.
     std::string warning() const { return watch_.warning(); }
+    // Trajectories whose kinetic energy is not positive, and what is so of the first.
+    struct NotPositive {
+        std::int64_t count = 0, first = -1;
+        std::string complaint;
+    };
+    const NotPositive& not_positive() const { return not_positive_; }
 
 private:
-    bool is_defined(const EnsembleTrajectory& trajectory) const;
+    bool is_defined(const EnsembleTrajectory& trajectory, const EnsembleStart& start) const;
+    void look_at_masses(std::int64_t trajectory, const std::vector<double>& parameters);
 
     const EnsembleRequest& request_;
     SweepWatch watch_;
     Domains domains_;
+    ConstantMasses masses_;
+    NotPositive not_positive_;
     std::optional<EnsembleCompanion> companion_;
     bool accepts_lost_;
     std::recursive_mutex& algebra_;  // formulas, which threads that make starts may evaluate too

@@ -166,7 +166,8 @@ void SweepStarts::find_dependents() {
         if (std::any_of(columns_.begin(), columns_.end(), [&](const Column& column) {
                 return column.of.role == Role::parameter && requirement.value.has(symbols[column.of.index]);
             }))
-            required_.push_back({Tape::of(requirement.value, symbols).value(), requirement.may_vanish});
+            required_.push_back(
+                {Tape::of(requirement.value, symbols).value(), requirement.may_vanish, requirement.complaint});
     const auto put = [&](Role role, std::size_t k, const GiNaC::ex& value, const std::string& what,
                          std::vector<double>& numbers, std::vector<GiNaC::numeric>& exact_numbers) {
         bool depends = false;
@@ -270,11 +271,9 @@ void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
         numbers[name.index] = value(trajectory, c);
         has_values = has_values && std::isfinite(numbers[name.index]);
     }
-    for (const Required& required : required_) {
-        const double margin = required.value(start.parameters);
-        if (!(required.may_vanish ? margin >= 0 : margin > 0))
-            start.q.front() = std::numeric_limits<double>::quiet_NaN();  // refused as what has no value
-    }
+    if (std::any_of(required_.begin(), required_.end(),
+                    [&](const Required& required) { return !required.holds(start.parameters); }))
+        start.q.front() = std::numeric_limits<double>::quiet_NaN();  // refused as what has no value
     if (dependents_.empty() && !assembled_ && parts_ == 1) return;
     if (!has_values) {  // nor has what follows from them
         start.q.front() = std::numeric_limits<double>::quiet_NaN();
@@ -318,6 +317,15 @@ void SweepStarts::start(std::int64_t trajectory, EnsembleStart& start) const {
     start.whole_parameters = whole(to_all_digits.parameters, start.parameters);
     start.whole_q = whole(to_all_digits.q, start.q);
     start.whole_rate = whole(to_all_digits.rate, start.rate);
+}
+
+std::string SweepStarts::complaint(std::int64_t trajectory) const {
+    std::vector<double> parameters = base_.parameters;
+    for (std::size_t c = 0; c < columns_.size(); ++c)
+        if (columns_[c].of.role == Role::parameter) parameters[columns_[c].of.index] = value(trajectory, c);
+    for (const Required& required : required_)
+        if (!required.holds(parameters)) return required.complaint;
+    return "";
 }
 
 // (D47) The nearest start that keeps the constraints; where there is none the given one, which the kernel refuses.

@@ -62,6 +62,8 @@ public:
 
     // "q = 0.5, omega = 2", or the settings among them
     std::string text_of(std::int64_t trajectory, bool settings_alone = false) const;
+    // Why the scene does not allow its parameters, with place; empty: it does. Such a start has no value.
+    std::string complaint(std::int64_t trajectory) const;
     // All that the starts depend on beside the scene: {"vary", "q = 0:3:1000"}
     const std::vector<std::pair<std::string, std::string>>& sources() const { return sources_; }
 
@@ -86,6 +88,11 @@ private:
     struct Required {
         Tape value;
         bool may_vanish;
+        std::string complaint;
+        bool holds(const std::vector<double>& parameters) const {
+            const double margin = value(parameters);
+            return may_vanish ? margin >= 0 : margin > 0;
+        }
     };
     // A start to all digits; what is varied, or follows from it, is replaced.
     struct Exact {

@@ -35,12 +35,15 @@ std::int64_t prime_from(std::int64_t number) {
 }
 
 // After how many steps a state is kept: as often as the user asks for, and about 61 times in all if companions are
-// compared. With a clock the steps are arrivals.
-std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool measures, bool has_clock) {
+// compared, fewer in short motions that are driven. With a clock the steps are arrivals.
+std::int64_t looked_at(std::int64_t every, std::int64_t steps, bool measures, bool is_driven) {
     constexpr std::int64_t comparisons = 61, most_tried = 1000;  // no part of times that one writes
-    const std::int64_t fewest = has_clock ? 1 : fewest_driven_steps;
+    const std::int64_t fewest = is_driven ? fewest_driven_steps : 1;
     if (!measures || steps == 0) return every;
-    if (every == 0 || every > steps) return prime_from(std::max(fewest, (steps + comparisons - 1) / comparisons));
+    if (every == 0 || every > steps) {
+        const std::int64_t least = std::max(fewest, (steps + comparisons - 1) / comparisons);
+        return least == 1 ? 1 : prime_from(least);
+    }
     const std::int64_t wanted = std::min(comparisons * every / steps, every / fewest);
     for (std::int64_t parts = std::max<std::int64_t>(1, wanted); parts <= std::min(every, wanted + most_tried); ++parts)
         if (every % parts == 0) return every / parts;
@@ -192,7 +195,7 @@ std::unique_ptr<SweepStudy::Setting> SweepStudy::prepare(std::int64_t number) {
         Scene scene = starts_->with_settings(as_written_, first);
         if (!scene_.outputs.kept.empty()) scene.outputs.energy = true;
         const auto derived_in = [&](Precision numbers, const Derivation* derivation) {
-            return derived_kernel(scene, {numbers, false, EnergyWatch::can_watch}, derivation,
+            return derived_kernel(scene, {numbers, Shortcuts::all, EnergyWatch::can_watch}, derivation,
                                   with_values(scene, values_of(first)));
         };
         DerivedKernel derived = derived_in(method.numbers, nullptr);
@@ -239,7 +242,7 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
     request.arrivals = arrivals_of(scene, setting.steps.count);
     request.arrivals.keeps_chain = false;
     request.every = looked_at(kept_by_sweeps(options_.overrides, scene), setting.steps.count, options_.measures,
-                              scene.clock.has_value());
+                              !scene.clock && !setting.outline->system.autonomous);
     request.threads = options_.threads;
     request.stops = scene.may_end_early();
     if (!scene.outputs.kept.empty()) {  // threads copy it: formulas are not for several at once
@@ -257,7 +260,7 @@ EnsembleRequest SweepStudy::request_of(const Setting& setting) const {
 void SweepStudy::enter(std::int64_t number) {
     if (current_ && current_->number == number) return;
     const std::lock_guard lock(algebra_);
-    note_warning();
+    note_warnings();
     judges_.reset();
     current_ = prepare(number);
     const Setting& setting = *current_;
@@ -303,15 +306,23 @@ void SweepStudy::count_missing(const std::vector<double>& kept) {
         if (asked[k].of != Reduction::Of::first && std::isnan(kept[k])) ++missing_[k];
 }
 
-void SweepStudy::note_warning() {
-    const std::string warning = judges_ ? judges_->warning() : "";
+void SweepStudy::note_warnings() {
+    if (!judges_) return;
+    if (const Judges::NotPositive& found = judges_->not_positive(); found.count > 0) {
+        const std::string values = starts_->text_of(found.first, false);
+        warnings_.push_back(
+            fmt::format("trajectory {}{}: {}. That is allowed, but mostly a value that is not meant{}", found.first,
+                        values.empty() ? "" : ", " + values, found.complaint,
+                        found.count == 1 ? "" : fmt::format("; {} more trajectories are such", found.count - 1)));
+    }
+    const std::string warning = judges_->warning();
     if (warning.empty()) return;
     const std::string setting = starts_->text_of(current_->number * starts_->count_of_setting(), true);
     warnings_.push_back(setting.empty() ? warning : setting + ": " + warning);
 }
 
 std::vector<std::string> SweepStudy::end() {
-    note_warning();
+    note_warnings();
     for (std::size_t k = 0; k < missing_.size(); ++k)
         if (missing_[k] > 0)
             warnings_.push_back(fmt::format("{} has no value in {} {} that reached the end, and is nan there",

@@ -94,7 +94,7 @@ private:
     void put_on_device(Setting& setting) const;
     void enter(std::int64_t number);
     void count_missing(const std::vector<double>& kept);
-    void note_warning();
+    void note_warnings();
 
     Scene as_written_, scene_;
     StudyOptions options_;

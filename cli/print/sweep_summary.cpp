@@ -149,8 +149,9 @@ std::string failures_text(const SweepStudy& study, const SweepTally& tally) {
                     tally.failed() < tally.trajectories() ? " The others went on." : "",
                     tally.failed() > std::ssize(first) ? "The first of them" : "They are");
     for (const SweepFigures& failure : first) {
+        const std::string complaint = study.starts().complaint(failure.index);
         text += fmt::format("\n  trajectory {}, {}: {}", failure.index, study.starts().text_of(failure.index),
-                            sweep_statuses[static_cast<std::size_t>(failure.status)]);
+                            complaint.empty() ? sweep_statuses[static_cast<std::size_t>(failure.status)] : complaint);
         if (failure.status < departed)
             text += study.scene().clock
                         ? fmt::format(" after t = {:.6g}, the last of its times that it reached", failure.time)

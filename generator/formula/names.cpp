@@ -4,6 +4,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "generator/formula/switch.hpp"
+
 namespace lobatto {
 
 Name& Names::add_parameter(const std::string& name, const std::vector<GiNaC::ex>& values, bool array) {
@@ -15,12 +19,19 @@ Name& Names::add_parameter(const std::string& name, const std::vector<GiNaC::ex>
 
 GiNaC::symbol Names::side_of(const GiNaC::ex& u, const std::string& function, const std::string& formula, Position at) {
     const bool may_jump = function == "sign" || function == "if";
+    const auto moves = [&](const GiNaC::ex& part) {
+        return std::any_of(flow.next.begin(), flow.next.end(), [&](const auto& one) {
+            const GiNaC::ex change = one.second - one.first;  // dt times a velocity
+            return part.has(one.first) || (!change.is_equal(flow.dt) && part.has(change / flow.dt));
+        });
+    };
+    const GiNaC::ex value = without_poles(u, moves);
     for (Switch& known : switches)
-        if (known.value.is_equal(u)) {
+        if (known.value.is_equal(value)) {
             known.may_jump = known.may_jump || may_jump;
             return known.side;
         }
-    switches.push_back({u, GiNaC::symbol(fmt::format("side_{}", switches.size() + 1)),
+    switches.push_back({value, GiNaC::symbol(fmt::format("side_{}", switches.size() + 1)),
                         fmt::format("{} in {}", function, formula), at, may_jump});
     return switches.back().side;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "generator/formula/switch.hpp"
 
+#include <algorithm>
+
 namespace lobatto {
 namespace {
 
@@ -23,7 +25,34 @@ bool is_call(const ex& expression, unsigned function) {
            GiNaC::ex_to<GiNaC::function>(expression).get_serial() == function;
 }
 
+bool is_tangent(const ex& expression) {
+    return is_call(expression, GiNaC::tan_SERIAL::serial);
+}
+
+// Whether sums, products and powers lead from u to a denominator that moves, or to a tangent of what moves.
+bool has_pole(const ex& u, const std::function<bool(const ex&)>& moves) {
+    if (is_tangent(u)) return moves(u.op(0));
+    if (GiNaC::is_a<GiNaC::power>(u) && u.op(1).info(GiNaC::info_flags::negint))
+        return u.op(1).info(GiNaC::info_flags::odd) && moves(u.op(0));
+    const bool is_rational = GiNaC::is_a<GiNaC::add>(u) || GiNaC::is_a<GiNaC::mul>(u) || GiNaC::is_a<GiNaC::power>(u);
+    return is_rational && std::any_of(u.begin(), u.end(), [&](const ex& part) { return has_pole(part, moves); });
+}
+
+struct WithoutTangents : GiNaC::map_function {
+    ex operator()(const ex& u) override {
+        const ex parts = u.map(*this);
+        return is_tangent(parts) ? GiNaC::sin(parts.op(0)) / GiNaC::cos(parts.op(0)) : parts;
+    }
+};
+
 }  // namespace
+
+ex without_poles(const ex& u, const std::function<bool(const ex&)>& moves) {
+    if (!has_pole(u, moves)) return u;
+    WithoutTangents without_tangents;
+    const ex fraction = without_tangents(u).numer_denom();
+    return fraction.op(0) * fraction.op(1);
+}
 
 // The program and the library may both be in one process: two of each name.
 REGISTER_FUNCTION(positive_part, eval_func(positive_part_value).derivative_func(positive_part_slope).overloaded(2))

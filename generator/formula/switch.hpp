@@ -10,6 +10,7 @@
 
 #include <ginac/ginac.h>
 
+#include <functional>
 #include <vector>
 
 #include "generator/formula/names.hpp"
@@ -29,6 +30,9 @@ Operand with_one_sign(int sign, Operand pieces);
 // The base of a power: that form, where the power and its derivative are 0 beyond the switch.
 Operand power_base(const Operand& base, const Operand& exponent, const Arithmetic& arithmetic);
 
+// What has the sign of u and no pole, where u is a fraction whose denominator `moves`: numerator times denominator.
+// A step looks for a zero of it, and u has none where it changes its sign at a pole.
+GiNaC::ex without_poles(const GiNaC::ex& u, const std::function<bool(const GiNaC::ex&)>& moves);
 // The side of a switch of u, which changes with what u holds.
 Operand as_side(const GiNaC::symbol& symbol, const Operand& u);
 // Whether u is 0 over stretches of a motion, where formulas of pieces in it are constant: with some choice of their

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <set>
 
 #include "generator/formula/real.hpp"
 #include "generator/formula/text/token.hpp"
@@ -287,6 +288,24 @@ void SystemReader::name_energy_and_momenta() {
             of_arrays["p_" + array].emplace_back(momentum);
     }
     for (const auto& [name, momenta] : of_arrays) add(name, momenta, true);
+}
+
+void SystemReader::read_columns(const Entry& entry) {
+    std::set<std::string> taken = {"H", scene_.has_time ? scene_.time.get_name() : "t"};
+    for (const Coordinate& coordinate : scene_.coordinates)
+        for (const char* prefix : {"", "p_"}) taken.insert(prefix + coordinate.name);
+    for (const Column& column : scene_.outputs.columns) taken.insert(column.name);
+    names_.records = false;  // a formula that has no value leaves its cell empty, and ends no motion
+    for (const Entry& line : table_of(source_, entry, "columns = { v = \"x'\" }, names with formulas")) {
+        if (!is_identifier(line.key))
+            fail(line.at, fmt::format("a column has a name of letters, digits and _, such as v, not {}", line.key));
+        if (!taken.insert(line.key).second)
+            fail(line.at, fmt::format("the table has a column {} already; choose another name", line.key));
+        const Scope scope = scope_of("the column " + line.key, true);
+        const Operand value = evaluate(source_, parse_formula(source_, formula_of(source_, line), scope), scope);
+        scene_.outputs.columns.push_back({line.key, "", value.expression});
+    }
+    names_.records = true;
 }
 
 void SystemReader::read_kept(const std::vector<std::string>& given) {

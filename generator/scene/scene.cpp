@@ -269,6 +269,7 @@ private:
             if (scene_.bodies.empty()) fail(bodies->at, "the scene has no bodies; leave it out");
             if (!boolean_of(source_, *bodies)) outputs.columns.clear();
         }
+        if (const Entry* columns = table.find("columns")) system_.read_columns(*columns);
         if (const Entry* multipliers = table.find("multipliers")) {
             outputs.multipliers = boolean_of(source_, *multipliers);
             if (outputs.multipliers && scene_.constraints.empty())

@@ -45,6 +45,8 @@ public:
 
     // A list such as ["x = 0 rising"], or one of them.
     std::vector<Event> read_events(const Entry& entry, const std::string& key);
+    // [output] columns: formulas that stand in the table of a trajectory beside the motion.
+    void read_columns(const Entry& entry);
     // [output] keep, or in its place what --keep gives.
     void read_kept(const std::vector<std::string>& given);
 

@@ -19,11 +19,13 @@ class State(NamedTuple):
     velocity: numpy.ndarray
 
 
-def _states_at(stepper, t, q, p, times):
-    """Positions and velocities at times of any shape, of a trajectory with these kept states: that shape x n."""
+def _states_at(stepper, t, q, p, dense, times):
+    """Positions and velocities at times of any shape, of a trajectory with these kept states: that shape x n.
+
+    ``dense`` of them lie inside each step, on its polynomial."""
     order = numpy.argsort(times, axis=None, kind="stable")
     back = numpy.argsort(order, kind="stable")
-    return (rows[back].reshape(times.shape + q.shape[1:]) for rows in stepper._states_at(t, q, p, times.ravel()[order]))
+    return (rows[back].reshape(times.shape + q.shape[1:]) for rows in stepper._states_at(t, q, p, dense, times.ravel()[order]))
 
 
 def _table(rows):
@@ -105,7 +107,7 @@ class Trajectory(_Rows):
         if self._stepper is None:
             self._stepper = Stepper(self.scene, **{**self._settings, "every": None, "numbers": "double"})
         times = numpy.asarray(t, dtype=float)
-        q, velocity = _states_at(self._stepper, self.t, self.q, self.p, times)
+        q, velocity = _states_at(self._stepper, self.t, self.q, self.p, self.dense, times)
         return State(float(t) if times.ndim == 0 else times, q, velocity)
 
     def plot(self, *names, x="t", ax=None, **options):

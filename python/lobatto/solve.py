@@ -167,7 +167,7 @@ def solve_ivp(scene, t_span, y0=None, *, t_eval=None, dense_output=False, **sett
 
     def sol(at):
         at = numpy.asarray(at, dtype=float)
-        states = _states_at(stepper.copy(), t, numpy.array(q), numpy.array(p), at)
+        states = _states_at(stepper.copy(), t, numpy.array(q), numpy.array(p), 0, at)
         return numpy.concatenate([numpy.moveaxis(rows, -1, 0) for rows in states])
 
     if t_eval is not None:

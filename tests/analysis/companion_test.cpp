@@ -265,7 +265,10 @@ TEST_CASE("what a pulse between the nodes does is measured") {
                            Row{"q'^2/2 - q^2/2 + 20*q*cos(t - 1.645)^64*(0.5 + 0.5*cos(16*(t - 1.645)))^60"
                                "*(0.5 + 0.5*cos(128*(t - 1.645)))^40",
                                0.0005},
+                           Row{"q'^2/2 - q^2/2 + 100*q*2^(-((t - 5.03)/0.001)^2)", 0.0005},
+                           Row{"q'^2/2 - q^2/2 + 100*q*(2 + sin(t))^(-((t - 5.03)/0.001)^2)", 0.0005},
                            Row{"q'^2/2 - q^2/2 + 100*q*exp(-((t - 5.03 - q/100)/0.001)^2)", 0.0005},
+                           Row{"q'^2/2 - q^2/2 + 100*q*10^(-((t - 5.03 - q/100)/0.001)^2)", 0.0005},
                            Row{"q'^2/2 - q^2/2 + 100*sin(q)*exp(-((t - 5.03)/0.001)^2*(1 + q^2))", 0.0005}}) {
         CAPTURE(row.lagrangian);
         const MeasuredScene coarse(timed_scene(row.lagrangian, swinging, four, 0.1, 10)),

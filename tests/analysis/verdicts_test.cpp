@@ -2,6 +2,8 @@
 // What runs say of themselves where little moves, where a stop ends them, and where no motion follows the Lagrangian.
 #include <doctest/doctest.h>
 
+#include <lobatto/lobatto.hpp>
+
 #include <cmath>
 #include <string>
 
@@ -148,8 +150,20 @@ TEST_CASE("a kinetic energy that is not positive is told") {
                "= "
                "0.1\nuntil = 1\n";
     };
-    CHECK(run(of_mass("-1")).err.find("the mass of x is negative at the start") != std::string::npos);
+    CHECK(run(of_mass("-1")).err.find("the mass of x is negative") != std::string::npos);
     CHECK(run(of_mass("1")).err.empty());
+    // Coupled inductances of more than sqrt(L1 L2).
+    const std::string coils =
+        "lagrangian = \"(a'^2 + b'^2)/2 + M*a'*b' - (a^2 + b^2)/2\"\n[parameters]\nM = 1.05\n[coordinates]\n"
+        "a = { position = 1, velocity = 0 }\nb = { position = 0, velocity = 0 }\n[run]\nstep = 0.01\nuntil = 1\n";
+    CHECK(run(coils).err.find("the kinetic energy is negative for some velocities, that of b among them") !=
+          std::string::npos);
+    CHECK(run(std::string(coils).replace(coils.find("1.05"), 4, "0.95")).err.empty());
+    const lobatto::api::Sweep sweep =
+        lobatto::api::sweep(lobatto::api::Scene::from_text(coils), {5, {{"M", {0.5, 0.9, 1.1, 1.2, -1.1}}}});
+    REQUIRE(sweep.warnings.size() == 1);
+    CHECK(sweep.warnings[0].find("trajectory 2, M = 1.1: the kinetic energy is negative") == 0);
+    CHECK(sweep.warnings[0].find("; 2 more trajectories are such") != std::string::npos);
     // A metric of relativity: a light ray's neighbour around a black hole.
     const test::Finished geodesic =
         run("lagrangian = \"(r'^2/(1 - 2/r) - (1 - 2/r)*w'^2 + r^2*phi'^2)/2\"\n[coordinates]\nr = { position = 10, "

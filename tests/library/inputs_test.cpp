@@ -275,6 +275,30 @@ TEST_CASE("runs hold the value of the scene, and --set gives them another") {
     CHECK(other.q.back() == doctest::Approx(1).epsilon(1e-13));
 }
 
+TEST_CASE("a state and the inputs that move its walls are taken together") {
+    lob::Stepper stepper = stepper_of(
+        "lagrangian = \"(1 + hi)*q'^2/2\"\n[coordinates]\nq = { position = 0.5, velocity = 0.25 }\n[inputs]\nlo = 0\n"
+        "hi = 1\n[impacts]\nfloor = { when = \"q = lo falling\" }\nceiling = { when = \"q = hi rising\" }\n[run]\n"
+        "step = 0.01\nuntil = 1\n");
+    const double q = 2.5, p = 1, v = 0.25, inputs[] = {2, 3}, wrong[] = {2, 2.25};
+    CHECK_THROWS_AS(stepper.set_inputs(inputs), lob::ComputationError);
+    CHECK_THROWS_AS(stepper.start(7, &q, &p), lob::ComputationError);
+    CHECK_THROWS_AS(stepper.start(7, &q, &p, wrong), lob::ComputationError);
+    CHECK(stepper.t() == 0);
+    CHECK(stepper.q()[0] == 0.5);
+    CHECK(stepper.parameter("hi") == 1);
+    stepper.start(7, &q, &p, inputs);
+    CHECK(stepper.t() == 7);
+    CHECK(stepper.q()[0] == 2.5);
+    CHECK(stepper.velocity()[0] == 0.25);
+    CHECK(stepper.parameter("hi") == 3);
+    stepper.start(0, &q, &p, inputs);
+    stepper.start_from_velocity(0, &q, &v, inputs);
+    CHECK(stepper.p()[0] == 1);  // of the mass that the new inputs make
+    stepper.step();
+    CHECK(stepper.q()[0] == doctest::Approx(2.5025).epsilon(1e-14));
+}
+
 TEST_CASE("C sets all inputs at once") {
     const std::string text = scene_of("q'^2/2 - q^2/2 + u*q", "[method]\npoints = 9");
     lobatto_scene* const scene = lobatto_scene_from_text(text.c_str(), "inputs.toml");
@@ -288,6 +312,11 @@ TEST_CASE("C sets all inputs at once") {
     CHECK(std::string(lobatto_integrator_message(motion)).find("NULL was given") != std::string::npos);
     CHECK(lobatto_integrator_advance(motion, 20) == 0);
     CHECK(lobatto_integrator_q(motion)[0] == doctest::Approx(1).epsilon(1e-13));
+    const double q = 2, p = 0, two = 2;
+    CHECK(lobatto_integrator_start_with_inputs(motion, 0, &q, &p, &two) == 0);
+    CHECK(lobatto_integrator_start_with_inputs(motion, 0, &q, &p, nullptr) == 2);
+    CHECK(lobatto_integrator_advance(motion, 20) == 0);
+    CHECK(lobatto_integrator_q(motion)[0] == doctest::Approx(2).epsilon(1e-13));
     lobatto_integrator_free(motion);
     lobatto_scene_free(scene);
 }

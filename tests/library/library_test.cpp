@@ -104,6 +104,16 @@ TEST_CASE("between the rows of a run its states are those of steps from the row 
     between.advance_to(0.42);
     CHECK(q[2] == between.q()[0]);
     CHECK(v[2] == between.velocity()[0]);
+    // Rows inside steps are those of a polynomial, and no places to go on from.
+    options.every.reset();
+    std::string text = scene.text();
+    const lob::Trajectory plain = lob::run(scene, options);
+    const lob::Scene with_dense = lob::Scene::from_text(text.insert(text.find("every = 1"), "dense = 3\n"));
+    const lob::Trajectory dense = lob::run(with_dense, options);
+    CHECK(dense.dense == 3);
+    CHECK(dense.t.size() == 4 * plain.t.size() - 3);
+    CHECK(lob::states_at(stepper, dense, {0.02, 0.05, 0.0625, 1}) ==
+          lob::states_at(stepper, plain, {0.02, 0.05, 0.0625, 1}));
     CHECK(lobatto::test::message_of<lob::InputError>([&] { static_cast<void>(lob::states_at(stepper, run, {1.5})); }) ==
           "t = 1.5 is outside the trajectory, which leads from 0 to 1");
     const lob::Stepper other(lob::compile(lob::Scene(scenes + "double_pendulum.toml")));

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <string>
+#include <tuple>
 
 #include "generator/scene/scene.hpp"
 #include "tests/support.hpp"
@@ -209,4 +210,44 @@ TEST_CASE("the sides of switches are no parameters that others set") {
     settings.set = {{"side_1", "-1"}};
     CHECK_THROWS_WITH_AS(lob::compile(scene, settings),
                          doctest::Contains("unknown parameter 'side_1'; declared: m; of the start: "), lob::InputError);
+}
+
+TEST_CASE("a condition that jumps, or has a pole, cuts steps there too") {
+    const auto spring = [](const std::string& condition, double step) {
+        return lob::run(
+            scene_of(fmt::format("lagrangian = \"(x'^2 + y'^2)/2 - (x^2 + y^2)/2\"\n[coordinates]\n"
+                                 "x = {{ position = 1, velocity = 0 }}\ny = {{ position = 0, velocity = "
+                                 "0.8 }}\n[forces]\nx = \"{}\"\n[run]\nstep = {}\nuntil = 20\n",
+                                 condition, step)));
+    };
+    // Two ways to write one sector. atan2 jumps at x < 0, y = 0; the other condition does not.
+    const lob::Trajectory smooth = spring("if(y > 0, if(cos(1)*y > sin(1)*x, 0.1, 0), 0)", 0.05);
+    for (const double step : {0.2, 0.1, 0.05}) {
+        CAPTURE(step);
+        const lob::Trajectory sector = spring("if(atan2(y, x) > 1, 0.1, 0)", step);
+        const double difference = std::fabs(sector.q[sector.q.size() - 2] - smooth.q[smooth.q.size() - 2]);
+        CHECK(difference < 2e-10 * std::pow(step / 0.05, 6));  // 1.7e-11 at 0.05; 6.5e-3 where the jump is not met
+        CHECK(difference < 4 * sector.error.value() + 1e-13);
+    }
+    const lob::Trajectory ratio = spring("if(y/x > 1, 0.1, 0)", 0.05),
+                          product = spring("if((y - x)*x > 0, 0.1, 0)", 0.05);
+    CHECK(std::fabs(ratio.q[ratio.q.size() - 2] - product.q[product.q.size() - 2]) < 1e-13);
+
+    // Sawtooth carriers: x'' is 1 in a part of each period, from a to b, and x(10) the sum of what each part leads to.
+    const double pi = std::acos(-1.0);
+    for (const auto& [carrier, a, b] : {std::tuple("atan2(sin(2*pi*t), cos(2*pi*t)) > 0.5", 0.25 / pi, 0.5),
+                                        std::tuple("tan(pi*t) > 1", 0.25, 0.5)}) {
+        CAPTURE(carrier);
+        double exact = 0;
+        for (int k = 0; k < 10; ++k) exact += (b - a) * (10 - k - (a + b) / 2);
+        for (const double step : {0.07, 0.1}) {
+            const lob::Trajectory run = lob::run(scene_of(fmt::format(
+                "time = \"t\"\nlagrangian = \"x'^2/2\"\n[coordinates]\nx = {{ position = 0, velocity = 0 }}\n"
+                "[forces]\nx = \"if({}, 1, 0)\"\n[run]\nstep = {}\nuntil = \"10\"\n",
+                carrier, step)));
+            const double t = run.t.back();  // in steps of 0.07 a little before 10, where the force is 0
+            const double v = 10 * (b - a);
+            CHECK(std::fabs(run.q.back() + v * (10 - t) - exact) < 1e-11);
+        }
+    }
 }

@@ -187,8 +187,8 @@ void Companion::lose_where_it_began(MeasuredError& error, const std::vector<doub
         std::vector<double> until_then = half_of(range.least, range.most);
         for (std::size_t i = 0; i < amplitude.size(); ++i)
             until_then[i] = std::fmin(amplitude[i], std::fmax(until_then[i], least * amplitude[i]));
-        const Distance distance =
-            distance_between(run_[j].row.data(), companion_[j].row.data(), parts_, until_then, of_run);
+        const Distance distance = distance_between(run_[j].row.data(), companion_[j].row.data(), parts_, until_then,
+                                                   of_run, momenta_alone(kernel_));
         lost = distance.is_lost() ? lost + 1 : 0;
         if (lost == 1) began = here;
         if (lost == in_a_row) break;
@@ -250,8 +250,8 @@ MeasuredError Companion::compare(const TrajectoryResult& result) const {
     const double of_run = error_of_run(ratio_of(segment(0)), kernel_->order);
     Distance last, worst;
     for (std::size_t j = 0; j < count; ++j) {
-        const Distance distance =
-            distance_between(run_[j].row.data(), companion_[j].row.data(), parts_, amplitude, of_run);
+        const Distance distance = distance_between(run_[j].row.data(), companion_[j].row.data(), parts_, amplitude,
+                                                   of_run, momenta_alone(kernel_));
         error.until = time_of(run_[j]);
         if (j == 0 || distance.relative > worst.relative) worst = distance;
         last = distance;

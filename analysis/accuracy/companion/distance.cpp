@@ -10,14 +10,16 @@ namespace lobatto {
 
 namespace {
 
-// Of an amplitude: where positions agree to this, momenta alone lose no motion. They may turn within a moment, as at
-// the pericentre of a long orbit.
-constexpr double momenta_alone = 0.01;
+constexpr double at_pericentre = 0.01, at_wall = 0.1;  // of an amplitude
 
 }  // namespace
 
+double momenta_alone(const Kernel& kernel) {
+    return kernel->impacts > 0 ? at_wall : at_pericentre;
+}
+
 Distance distance_between(const double* run, const double* companion, std::size_t parts,
-                          const std::vector<double>& amplitude, double of_run) {
+                          const std::vector<double>& amplitude, double of_run, double momenta_alone) {
     const std::size_t n = amplitude.size() / 2;
     Distance found;
     bool agree = true, any = false, is_number = true;  // agree, any: of positions

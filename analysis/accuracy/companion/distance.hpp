@@ -19,10 +19,14 @@ struct Distance {
     bool is_lost() const { return !(apart < out_of_step); }
 };
 
+// Of an amplitude: where positions agree to this, momenta alone lose no motion. They may turn within a moment, as at
+// the pericentre of a long orbit; at a wall they turn at once.
+double momenta_alone(const Kernel& kernel);
+
 // Distances are in amplitudes; numbers whose amplitude is 0 do not count. `run`, `companion`: q, p, each number in
 // `parts` doubles. `of_run`: the error of the run for one of their difference.
 Distance distance_between(const double* run, const double* companion, std::size_t parts,
-                          const std::vector<double>& amplitude, double of_run);
+                          const std::vector<double>& amplitude, double of_run, double momenta_alone);
 
 // What the difference of a run and a companion with `ratio` times as many steps is to be multiplied by, to be the error
 // of the run: errors are in proportion to h^order.

@@ -24,20 +24,22 @@ namespace {
 constexpr std::int64_t numbers_at_once = 1 << 20, numbers_on_device = 1 << 24;
 constexpr double seconds_at_once = 1;      // a sweep that is killed has no rows of those that were computed last
 constexpr std::int64_t between_looks = 8;  // steps of a companion, at least
+constexpr std::int64_t few_comparisons = 8;
 
 const double unknown = std::numeric_limits<double>::quiet_NaN();
 
 // In how many parts a companion looks at its way from one comparison to the next: states that are kept after whole
-// periods are all at one place, and tell no amplitude.
-std::int64_t looks_of(std::int64_t every) {
+// periods are all at one place, and tell no amplitude. Of few comparisons it looks as often as it can.
+std::int64_t looks_of(std::int64_t every, std::int64_t steps) {
+    const std::int64_t between = steps / every < few_comparisons ? 1 : between_looks;
     for (const std::int64_t parts : {13, 11, 7, 5, 3})
-        if (every % parts != 0 && every / parts >= between_looks) return parts;
+        if (every % parts != 0 && every / parts >= between) return parts;
     return 1;
 }
 
 // Steps for `every` of the sweep: about 3/2 of them, without a common divisor, in equal parts.
-std::int64_t steps_taken(std::int64_t every) {
-    const std::int64_t parts = looks_of(every);
+std::int64_t steps_taken(std::int64_t every, std::int64_t steps) {
+    const std::int64_t parts = looks_of(every, steps);
     std::int64_t taken = (companion_steps(every) + parts - 1) / parts * parts;
     while (std::gcd(every, taken) != 1) taken += parts;
     return taken;
@@ -65,7 +67,7 @@ EnsembleCompanion::EnsembleCompanion(const Outline& outline, const Kernel& kerne
 void EnsembleCompanion::compute(std::int64_t first) {
     const auto n = static_cast<std::int64_t>(groups_.size());
     const std::int64_t every = request_.every == 0 ? request_.steps : std::min(request_.every, request_.steps),
-                       rows = (request_.steps / every + 1) * looks_of(every),
+                       rows = (request_.steps / every + 1) * looks_of(every, request_.steps),
                        numbers = request_.device ? numbers_on_device : numbers_at_once,
                        room = numbers / ((8 + 2 * rows) * n * kernel_->parts),
                        group = 64 * std::max(request_.threads, 1),
@@ -102,7 +104,8 @@ void EnsembleCompanion::take(std::int64_t begin, std::int64_t steps, std::int64_
     companion.from_velocities = request_.from_velocities && begin == 0;
     companion.time = time_after(request_, begin);
     const bool is_clocked = request_.arrivals.interval != 0;  // then both arrive at the same times
-    const std::int64_t taken = is_clocked ? every : steps_taken(every), looks = is_clocked ? 1 : looks_of(every);
+    const std::int64_t taken = is_clocked ? every : steps_taken(every, request_.steps),
+                       looks = is_clocked ? 1 : looks_of(every, request_.steps);
     companion.step = is_clocked ? request_.step / clocked_ratio
                                 : request_.step * static_cast<double>(every) / static_cast<double>(taken);
     if (parts_ > 1) companion.whole_step = times_fraction(request_.whole_step, every, taken);
@@ -285,7 +288,7 @@ bool EnsembleCompanion::go_to_stop(Known& known, const Records& kept, const Ense
         while (place.advance(1, request_.tolerance * finer_iteration) == 0 && place.status == LOBATTO_OK) {
         }  // a call takes so many steps
     } else if (way * request_.step > 0) {
-        const double ratio = static_cast<double>(steps_taken(every())) / static_cast<double>(every());
+        const double ratio = static_cast<double>(steps_taken(every(), request_.steps)) / static_cast<double>(every());
         const std::int64_t taken = std::max<std::int64_t>(1, std::llround(std::ceil(way / request_.step * ratio)));
         place.set_step(times_fraction(as_parts({way}, parts_), 1, taken), parameters);
         place.advance(taken, request_.tolerance * finer_iteration);
@@ -326,12 +329,13 @@ EnsembleCompanion::Error EnsembleCompanion::of(const EnsembleTrajectory& traject
     const std::vector<double> amplitude = amplitudes(kept, known, start.parameters, comparisons, pair);
     const double ratio = request_.arrivals.interval != 0
                              ? clocked_ratio
-                             : static_cast<double>(steps_taken(every())) / static_cast<double>(every()),
+                             : static_cast<double>(steps_taken(every(), request_.steps)) / static_cast<double>(every()),
                  of_run = error_of_run(ratio, kernel_->order);
     Error error{0, false};
     double largest = 0;
     for (std::int64_t j = 0; j < comparisons; ++j) {
-        const Distance distance = distance_between(run_at(j), companion_at(j), parts_, amplitude, of_run);
+        const Distance distance =
+            distance_between(run_at(j), companion_at(j), parts_, amplitude, of_run, momenta_alone(kernel_));
         error.relative = distance.relative;
         error.lost = error.lost || distance.is_lost();
         largest = std::fmax(largest, error.relative);

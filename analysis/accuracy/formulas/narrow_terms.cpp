@@ -71,6 +71,7 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
             if (bend.width < sharp * span)
                 add(Kind::step, (table.op(2) - GiNaC::numeric(bend.place)) / GiNaC::numeric(bend.width));
     };
+    const std::vector<GiNaC::symbol> motion = system.motion();
     int parts = 0;
     const auto look_at = [&](const ex& formula) {
         for (auto part = formula.preorder_begin(); part != formula.preorder_end() && parts < most_parts; ++part) {
@@ -82,6 +83,8 @@ NarrowTerms::NarrowTerms(const SystemOutline& system) {
                 if (is_table_value(*part)) add_table(*part);
                 if (name == "tan") add(Kind::pole, GiNaC::cos(part->op(0)));
                 if (name == "asin" || name == "acos") add(Kind::pole, 1 - GiNaC::pow(part->op(0), 2));
+            } else if (is_exponential(*part, motion)) {
+                add(Kind::peak, natural_exponent(*part));
             } else if (GiNaC::is_a<GiNaC::power>(*part) && !part->op(1).info(GiNaC::info_flags::nonnegint)) {
                 add(Kind::pole, part->op(0));
             }

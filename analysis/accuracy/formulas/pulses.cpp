@@ -65,9 +65,12 @@ public:
     void look_at(const ex& formula) {
         each_in_time(formula, [this](const ex& part, const ex& u) {
             const bool is_function = GiNaC::is_a<GiNaC::function>(part);
-            const std::string name = is_function ? GiNaC::ex_to<GiNaC::function>(part).get_name() : "";
-            const bool is_power = !is_function && GiNaC::is_a<GiNaC::numeric>(part.op(1));
-            const double exponent = is_power ? GiNaC::ex_to<GiNaC::numeric>(part.op(1)).to_double() : 0;
+            const ex power = is_function ? ex(0) : part.op(1).subs(values_);
+            const std::string name = is_function     ? GiNaC::ex_to<GiNaC::function>(part).get_name()
+                                     : power.has(t_) ? "exp"
+                                                     : "";
+            const double exponent =
+                GiNaC::is_a<GiNaC::numeric>(power) ? GiNaC::ex_to<GiNaC::numeric>(power).to_double() : 0;
             if (is_table_value(part))
                 of_table(spline_in(part), u);
             else if (u.is_polynomial(t_))
@@ -126,7 +129,9 @@ private:
     void each_in_time(const ex& formula, const Visit& visit) {
         for (auto part = formula.preorder_begin(); part != formula.preorder_end(); ++part) {
             if (!GiNaC::is_a<GiNaC::function>(*part) && !GiNaC::is_a<GiNaC::power>(*part)) continue;
-            const ex& inner = is_table_value(*part) ? part->op(2) : part->op(0);
+            const ex inner = is_table_value(*part)                    ? part->op(2)
+                             : is_exponential(*part, std::vector{t_}) ? natural_exponent(*part)
+                                                                      : part->op(0);
             if (!inner.has(t_) || holds_motion(*part) || !known_.insert(*part).second) continue;
             visit(*part, inner.subs(values_));
         }

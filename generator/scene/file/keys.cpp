@@ -127,6 +127,7 @@ std::vector<Key> make_keys() {
                  key("energy", Holds::truth, "Whether the energy is a column"),
                  key("momenta", Holds::truth, "Whether the momenta are columns"),
                  key("bodies", Holds::truth, "Whether orientations and angular velocities of bodies are columns"),
+                 key("columns", Holds::names, "More columns of a run, such as { v = \"x'\" }"),
                  key("multipliers", Holds::truth, "Whether the multipliers of constraints are columns"),
                  key("tangent", Holds::truth, "Whether the derivative of a step is in the kernel"),
                  whole("dense", 0, 100, "States between two steps, on the polynomial of the step"),

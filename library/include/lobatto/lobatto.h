@@ -101,6 +101,9 @@ LOBATTO_C_API const char* lobatto_integrator_message(const lobatto_integrator* i
 LOBATTO_C_API int lobatto_integrator_start(lobatto_integrator* integrator, double t, const double* q, const double* p);
 LOBATTO_C_API int lobatto_integrator_start_from_velocity(lobatto_integrator* integrator, double t, const double* q,
                                                          const double* velocity);
+/* The same with other values of all inputs. */
+LOBATTO_C_API int lobatto_integrator_start_with_inputs(lobatto_integrator* integrator, double t, const double* q,
+                                                       const double* p, const double* inputs);
 LOBATTO_C_API int lobatto_integrator_advance(lobatto_integrator* integrator, int64_t steps);
 LOBATTO_C_API int lobatto_integrator_advance_to(lobatto_integrator* integrator, double t);
 LOBATTO_C_API int lobatto_integrator_set(lobatto_integrator* integrator, const char* parameter, double value);

@@ -190,9 +190,10 @@ public:
     std::size_t coordinates() const;
     std::size_t inputs() const;
     double step_size() const;
-    /// Another place to go on from. n positions; n momenta, or n velocities.
-    void start(double t, const double* q, const double* p);
-    void start_from_velocity(double t, const double* q, const double* v);
+    /// Another place to go on from. n positions; n momenta, or n velocities. With `inputs` all of these change too,
+    /// at once: where walls move with them, neither the state nor they would be taken alone.
+    void start(double t, const double* q, const double* p, const double* inputs = nullptr);
+    void start_from_velocity(double t, const double* q, const double* v, const double* inputs = nullptr);
 
     /// Takes steps; with a clock, they are arrivals at the scene's times (`[output] every`). A step that fails leaves
     /// the state where it was and throws ComputationError. Returns false where a stop of the scene ended the motion:
@@ -263,6 +264,7 @@ struct Trajectory {
     bool interrupted = false;    ///< by `progress`
     std::string method, digest;  ///< of the kernel
     double step = 0;
+    std::int64_t dense = 0;  ///< rows inside each step, on its polynomial ([output] dense)
     /// Relative to the amplitude of the motion: at the end, and the largest. Empty: not measured.
     std::optional<double> error, largest_error;
     std::optional<double> doubling;  ///< of errors that grow exponentially: the time in which they double
@@ -297,9 +299,9 @@ struct RunOptions : Settings {
 ///
 LOBATTO_API Trajectory run(const Scene& scene, const RunOptions& options = {});
 
-/// Positions and velocities at ascending times of a run: those of its rows, and between two rows what steps from the
-/// earlier one lead to, of which the last is shortened to end there. `stepper` is of the same scene and settings; only
-/// t, q and p of the run are read. Both results are times x n.
+/// Positions and velocities at ascending times of a run: those of its rows at the ends of steps, and between two of
+/// these what steps from the earlier one lead to, of which the last is shortened to end there. `stepper` is of the same
+/// scene and settings; only t, q, p and dense of the run are read. Both results are times x n.
 ///
 ///     const lob::Trajectory swing = lob::run(scene);
 ///     const auto [positions, velocities] = lob::states_at(stepper, swing, {0.25, 0.5});

@@ -194,6 +194,7 @@ private:
     }
 
     static constexpr bool is_wall(int e) { return e >= first_wall; }
+    static constexpr bool is_switch(int e) { return e >= K::events - switches_of<K>(); }
     real side(int e) const { return sides[e - first_wall]; }
 
     void find_events(int e, real until) {
@@ -394,7 +395,7 @@ private:
                         const real root = is_beyond    ? until
                                           : is_exactly ? samples[zero].theta
                                           : changes(samples[from].value, here.value)
-                                              ? root_between(samples[from], here, is_root, g)
+                                              ? root_between(samples[from], here, is_switch(e), is_root, g)
                                               : samples[from].theta;
                         if (is_root) add(e, root);
                     }

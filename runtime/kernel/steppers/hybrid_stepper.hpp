@@ -17,8 +17,16 @@ public:
     static constexpr int n = K::coordinates, columns = Watch<K>::columns;
 
     HybridStepper() = default;
-    HybridStepper(const HybridStepper&) = delete;
-    HybridStepper& operator=(const HybridStepper&) = delete;
+    // A copy goes on with the same bits: a motion that is kept to go back to.
+    HybridStepper(const HybridStepper& other) { *this = other; }
+    HybridStepper& operator=(const HybridStepper& other) {
+        if (this == &other) return *this;
+        stepper = other.stepper;
+        started = other.started;
+        delete looks;
+        looks = other.looks == nullptr ? nullptr : new Looks(stepper, *other.looks);
+        return *this;
+    }
     ~HybridStepper() { delete looks; }
 
     void set_tolerance(real tolerance) { stepper.tolerance = tolerance; }  // of increments, relative; 0: to rounding
@@ -74,6 +82,9 @@ public:
 private:
     struct Looks {
         explicit Looks(const WatchedStepper<K>& stepper) : watch(stepper) {}
+        Looks(const WatchedStepper<K>& stepper, const Looks& other) : watch(stepper), count(other.count) {
+            for (std::int64_t i = 0; i < count * columns; ++i) rows[i] = other.rows[i];
+        }
         Watch<K> watch;
         real rows[Watch<K>::most * columns];
         std::int64_t count = 0;

@@ -71,10 +71,10 @@ struct SampledFunction {
     }
 
     // The root between a and b, to the rounding of theta: secants, with the value of an end that stays halved (the
-    // Illinois method), and every third time the middle. None where g grows, or changes at once: its sign changes at a
-    // pole, or where it jumps.
+    // Illinois method), and every third time the middle. Where g grows, or changes at once, its sign changes at a pole,
+    // or where it jumps: that is a root if it `may_jump`, beyond the jump.
     template <class G>
-    static real root_between(Sample a, Sample b, bool& is_root, const G& g) {
+    static real root_between(Sample a, Sample b, bool may_jump, bool& is_root, const G& g) {
         const real largest = fabs(a.value) < fabs(b.value) ? fabs(b.value) : fabs(a.value);
         const real change = fabs(b.value - a.value);
         const bool may_tell = b.theta - a.theta > real(16) * rounding;
@@ -105,8 +105,8 @@ struct SampledFunction {
             }
         }
         const bool jumps = may_tell && nearest.value != real(0) && fabs(b.value - a.value) > real(0.5) * change;
-        is_root = is_finite(nearest.value) && fabs(nearest.value) <= largest && !jumps;
-        return nearest.theta;
+        is_root = is_finite(nearest.value) && ((fabs(nearest.value) <= largest && !jumps) || may_jump);
+        return jumps && may_jump ? b.theta : nearest.theta;
     }
 };
 

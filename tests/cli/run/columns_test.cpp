@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The columns of a trajectory beside its state: eliminated coordinates, and what bodies do.
+// The columns of a trajectory beside its state: formulas of the scene, eliminated coordinates, and what bodies do.
 #include <doctest/doctest.h>
 #include <ginac/ginac.h>
 
@@ -56,6 +56,41 @@ TEST_CASE("eliminated coordinates have columns behind the state") {
     heavy.replace(heavy.find(" - y"), 4, " - y + a'^2");
     CHECK(table_of_run(heavy + "[output]\nmultipliers = true\n").table.columns ==
           Columns{"t", "x", "a", "y", "p_x", "p_a", "p_y", "lambda_across", "lambda_up", "H"});
+}
+
+TEST_CASE("a scene names formulas that are columns") {
+    const std::string circuit =
+        "time = \"s\"\nlagrangian = \"L*q'^2/2 - q^2/(2*C)\"\ndefinitions = { v = \"q/C\" }\n[coordinates]\n"
+        "q = { position = 1, velocity = 0 }\n[parameters]\nL = 2\nC = 0.5\n[run]\nstep = 0.1\nuntil = 1\n"
+        "[output]\ncolumns = { i = \"q'\", u = \"v*cos(s)\", size = \"abs(q - 0.7)\", depth = \"log(q')\" }\n";
+    const TableOfRun run = table_of_run(circuit);
+    const double q = std::cos(1.0), i = -std::sin(1.0);  // exactly
+    CHECK(test::column_of(run.table, "i").back() == doctest::Approx(i).epsilon(1e-9));
+    CHECK(test::column_of(run.table, "u").back() == doctest::Approx(q / 0.5 * std::cos(1.0)).epsilon(1e-9));
+    CHECK(test::column_of(run.table, "size").front() == doctest::Approx(0.3).epsilon(1e-9));
+    CHECK(test::column_of(run.table, "size").back() == doctest::Approx(0.7 - q).epsilon(1e-9));
+    CHECK(std::isnan(test::column_of(run.table, "depth").back()));  // it has no value, and the run goes on
+    // A bead on a parabola, of which z is eliminated.
+    const TableOfRun rod = table_of_run(
+        "lagrangian = \"(x'^2 + z'^2)/2 - z\"\n[coordinates]\nx = { position = 0.6, velocity = 0 }\nz = {}\n"
+        "[constraints]\nslope = \"z = x^2\"\n[run]\nstep = 0.05\nuntil = 1\n[output]\n"
+        "columns = { speed = \"sqrt(x'^2 + z'^2)\" }\n");
+    const double x = test::column_of(rod.table, "x").back(), speed = test::column_of(rod.table, "speed").back();
+    CHECK(speed * speed / 2 + x * x == doctest::Approx(0.36).epsilon(1e-8));
+    for (const auto& [formula, error] :
+         {std::pair("q = \"q'\"", "the table has a column q already; choose another name"),
+          std::pair("p_q = \"q'\"", "the table has a column p_q already"),
+          std::pair("s = \"q'\"", "the table has a column s already"),
+          std::pair("\"a b\" = \"q'\"", "a column has a name of letters, digits and _, such as v, not a b"),
+          std::pair("i = \"q' + r\"", "unknown name 'r' in the column i")}) {
+        const test::TemporaryFolder folder;
+        std::string text = circuit;
+        text.replace(text.find("i = \"q'\""), 8, formula);
+        test::write_text(folder / "scene.toml", text);
+        const test::Finished finished = test::run({LOBATTO_PROGRAM, "run", folder / "scene.toml"});
+        CHECK(finished.exit_code == 2);
+        CHECK(test::contains(finished.err, error));
+    }
 }
 
 TEST_CASE("columns have all digits of the numbers") {

@@ -420,19 +420,21 @@ TEST_CASE("trajectories that fail are listed, the others are in the table, the e
     // No mass; no place to start from.
     const test::Finished none = place.sweep({scene, "--vary", "m=1,0,-1"});
     CHECK(none.exit_code == 3);
-    CHECK(none.err ==
-          "lobatto: " + scene +
-              ": 2 of 3 trajectories failed: 1 not finite, 1 singular mass matrix. The others went on. They are:\n"
-              "  trajectory 1, m = 0: singular mass matrix in step 1, after t = 0\n"
-              "  trajectory 2, m = -1: not finite in step 1, after t = 0\n"
-              "Try a smaller --step, or leave these values out. What was computed is in " +
-              place.file() + ".\n");
+    CHECK(
+        none.err ==
+        "lobatto: " + scene +
+            ": 2 of 3 trajectories failed: 1 singular mass matrix, 1 a formula has no value there. The others went on. "
+            "They are:\n"
+            "  trajectory 1, m = 0: singular mass matrix in step 1, after t = 0\n"
+            "  trajectory 2, m = -1: a formula has no value there\n"
+            "Leave these values out. What was computed is in " +
+            place.file() + ".\n");
     const test::TrajectoryTable starts = test::read_trajectory(place.file());
     REQUIRE(starts.rows.size() == 3);
-    CHECK(test::column_of(starts, "status") == std::vector<double>{0, 4, 2});
+    CHECK(test::column_of(starts, "status") == std::vector<double>{0, 4, 10});
     CHECK(std::isnan(test::column_of(starts, "x")[2]));
     const test::Finished all = place.sweep({scene, "--vary", "m=-2,-1"});
-    CHECK(test::contains(all.err, ": 2 of 2 trajectories failed: 2 not finite. They are:\n"));
+    CHECK(test::contains(all.err, ": 2 of 2 trajectories failed: 2 a formula has no value there. They are:\n"));
 }
 
 TEST_CASE("a trajectory that goes on in lanes where alone it cannot has left its Lagrangian, measured or not") {
@@ -746,6 +748,29 @@ TEST_CASE("a sweep meets what is narrower than a step, and is not deceived by st
             if (!std::isnan(errors[i])) CHECK(errors[i] < 1e-9);
         CHECK(*std::max_element(status.begin(), status.end()) == 0);
     }
+}
+
+TEST_CASE("a sweep of few steps knows the amplitude, also where the motion ends as it began") {
+    // In ten steps once around: x(6) = 0.99797722, by steps of 0.001.
+    const Place place;
+    const std::string scene = place.file("once.toml");
+    test::write_text(scene,
+                     "lagrangian = \"x'^2/2 - x^2/2 - x^4/40\"\n[coordinates]\nx = { position = 1, velocity = 0 }\n"
+                     "[method]\npoints = 3\n[run]\nstep = 0.6\nuntil = 6\n");
+    REQUIRE(place.sweep({scene, "--vary", "x=1,1.01"}).exit_code == 0);
+    const test::TrajectoryTable table = test::read_trajectory(place.file());
+    CHECK(test::column_of(table, "error")[0] == doctest::Approx(3.1e-5).epsilon(0.2));
+    const double error = std::fabs(test::column_of(table, "x")[0] - 0.99797722);
+    CHECK(test::column_of(table, "error")[0] == doctest::Approx(error).epsilon(0.1));
+    CHECK(place.sweep({scene, "--vary", "x=1,1.01", "--points", "2"}).exit_code == 0);
+    // Driven, too: a companion looks between two comparisons.
+    test::write_text(scene,
+                     "time = \"t\"\nlagrangian = \"x'^2/2 - x^2/2 - x^4/40 + 1e-6*x*sin(t)\"\n[coordinates]\n"
+                     "x = { position = 1, velocity = 0 }\n[method]\npoints = 3\n[run]\nstep = 0.6\nuntil = 6\n");
+    REQUIRE(place.sweep({scene, "--vary", "x=1,1.01"}).exit_code == 0);
+    const double driven = test::column_of(test::read_trajectory(place.file()), "error")[0];
+    CHECK(driven > 2.5e-5);
+    CHECK(driven < 5e-5);
 }
 
 TEST_CASE("a trajectory whose formulas have no value, though they cancel, is no success" *

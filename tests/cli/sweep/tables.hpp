@@ -4,7 +4,6 @@
 
 #include <doctest/doctest.h>
 
-#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -49,14 +48,5 @@ public:
 private:
     TemporaryFolder folder_;
 };
-
-inline std::vector<double> column_of(const TrajectoryTable& table, const std::string& name) {
-    const auto found = std::find(table.columns.begin(), table.columns.end(), name);
-    REQUIRE(found != table.columns.end());
-    std::vector<double> values;
-    for (const std::vector<double>& row : table.rows)
-        values.push_back(row[static_cast<std::size_t>(found - table.columns.begin())]);
-    return values;
-}
 
 }  // namespace lobatto::test
