@@ -145,7 +145,8 @@ void add_check(CommandLine& program) {
         program.command("check", "Say in plain words what was found in a scene, and what its kernel leaves out");
     command.option("SCENE", options->scene, "Scene file").required();
     options->method.add_to(command);
-    command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
+    command.flag("--general", options->general,
+                 "Turn off all shortcuts that the scene's structure allows, for comparison");
     add_json_option(command, options->json);
     command.flag("--watch", options->watch, "Print again whenever the scene is saved");
     command.footer("Example:\n  lobatto check scenes/two_pendulums.toml");

@@ -50,7 +50,7 @@ void print_report(const std::vector<PassReport>& report) {
                                              now.multiplications, now.divisions, now.functions, now.total(), change);
         fmt::print(std::cout, "{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
     }
-    fmt::print(std::cout, "(over all functions of the kernel; values compared at 60 digits)\n");
+    fmt::print(std::cout, "(over all functions of the kernel; each pass keeps all values to 40 digits)\n");
 }
 
 void print_use(const KernelSource& source, const EmitCommand& options, const Scene& scene) {
@@ -185,8 +185,8 @@ void add_emit(CommandLine& program) {
         .required()
         .shown_as("FOLDER");
     options->method.add_to(command);
-    const Option general =
-        command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
+    const Option general = command.flag("--general", options->general,
+                                        "Turn off all shortcuts that the scene's structure allows, for comparison");
     const Option standalone =
         command.flag("--standalone", options->standalone, "One file that carries kernel.hpp inside");
     const Option no_support =

@@ -407,7 +407,8 @@ void add_run(CommandLine& program) {
                 "Trajectory: .csv, .npy (NumPy) or .h5 (HDF5), or - for standard output (default: out/NAME.csv)")
         .shown_as("FILE");
     options->method.add_to(command);
-    command.flag("--general", options->general, "Use nothing of what the scene's structure allows, for comparison");
+    command.flag("--general", options->general,
+                 "Turn off all shortcuts that the scene's structure allows, for comparison");
     add_step_option(command, options->overrides);
     add_until_option(command, options->overrides);
     command.option("--every", options->overrides.every, "Keep every N-th state; with a clock the time between two")
@@ -423,8 +424,9 @@ void add_run(CommandLine& program) {
                 "Numbers of the companion, such as double-double: the error to two digits where rounding decides it, "
                 "too. The run waits for it")
         .shown_as("NUMBERS");
-    command.flag("--beyond-horizon", options->beyond_horizon,
-                 "Go on where nothing of the motion is left, for the statistics of chaos; else that is an error");
+    command.flag(
+        "--beyond-horizon", options->beyond_horizon,
+        "Continue even when the error is as large as the motion, for the statistics of chaos; else that is an error");
     command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");
