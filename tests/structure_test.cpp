@@ -315,6 +315,21 @@ TEST_CASE(
                 }
 }
 
+TEST_CASE("every header states its one idea after the licence, and so does every source without a header of its name") {
+    int looked_at = 0;
+    for (const char* part : {"generator", "runtime", "analysis", "library", "cli", "bench", "python", "tests"})
+        for (const fs::path& file : sources(part)) {
+            fs::path header = file;
+            if (file.extension() == ".cpp" && fs::exists(header.replace_extension(".hpp"))) continue;
+            ++looked_at;
+            const auto text = lines(file);
+            INFO(fs::relative(file, tree).string());
+            REQUIRE(text.size() > 1);
+            CHECK((text[1].starts_with("//") || text[1].starts_with(" * ")));
+        }
+    CHECK(looked_at > 500);
+}
+
 TEST_CASE("every source file begins with its licence: MIT in what users ship, GPL elsewhere") {
     const auto check = [](const std::string& folder, const std::string& licence) {
         for (const fs::path& file : sources(folder)) {

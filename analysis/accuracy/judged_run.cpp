@@ -37,27 +37,26 @@ std::string gauss_advice(const Scene& scene, lobatto_status status) {
                : "";
 }
 
-// That nothing of the motion is left in the result, unless that was accepted. Empty: something is.
+// That the error became as large as the motion. Empty: it did not.
 std::string loss_of(const Scene& scene, const TrajectoryRequest& request, const std::optional<MeasuredError>& error) {
     if (!error || !error->is_lost()) return "";
     if (error->rests)
         return fmt::format(
-            "the run rests where it begins, q = {}, p = {}, but a start that differs by rounding leaves it: the "
-            "equilibrium is unstable (`lobatto stability` tells), or the step too long for it, or each step changes "
-            "less "
-            "than a last digit. What a motion does that begins there is not known. Start elsewhere, compute in finer "
-            "numbers (--numbers double-double), or try a smaller step, such as h = {:.6g}, or --beyond-horizon, where "
-            "the run shall rest.",
+            "the run rests where it begins, q = {}, p = {}, but a start that differs by rounding moves away. Either "
+            "the equilibrium is unstable (see `lobatto stability`), or the step is too long for it, or each step "
+            "changes less than a last digit. So the motion from this start is not known. Start elsewhere, compute in "
+            "finer numbers (--numbers double-double), or try a smaller step, such as h = {:.6g}. With --beyond-horizon "
+            "the run at rest is accepted.",
             list_text(request.q), list_text(request.p), request.step / 2);
     const std::string clock = clock_advice(scene);
     const char* const why = error->companion_stopped
-                                ? "there the same run with 2/3 of the step cannot go on, and what follows is not known"
-                                : "from there on the error is as large as the motion itself, and nothing of it is left";
+                                ? "the same run with 2/3 of the step cannot go on there, so the rest is not known"
+                                : "there the error becomes as large as the motion itself";
     const std::string chaos =
         error->doubling ? fmt::format(", an earlier end (errors double every {:.3g})", *error->doubling) : "";
     return fmt::format(
-        "the run left its motion by t = {:.6g}, q = {}, p = {}: {}. Try a smaller step, such as h = {:.6g}, more "
-        "points{}{}, or --beyond-horizon where the statistics of the motion are what counts.",
+        "the run is no longer accurate after t = {:.6g}, q = {}, p = {}: {}. Try a smaller step, such as "
+        "h = {:.6g}, more points{}{}, or --beyond-horizon if you need only statistics of the motion.",
         *error->lost_after, list_text(error->lost_q), list_text(error->lost_p), why, request.step / 2, clock, chaos);
 }
 
@@ -67,33 +66,32 @@ std::vector<std::string> warnings_of(const MeasuredError& error, double wanted, 
     if (error.is_lost()) return {};
     std::vector<std::string> texts;
     if (error.worst() > large_error)
-        texts.push_back(
-            !error.complete && error.at_end > 1
-                ? "the error is as large as the motion at the end, if it grows on; take a smaller step, or more points"
-                : fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points",
-                              error.worst()));
+        texts.push_back(!error.complete && error.at_end > 1
+                            ? "the error is as large as the motion at the end, if it keeps growing; take a smaller "
+                              "step, or more points"
+                            : fmt::format("the error is {:.2g} of the amplitude; take a smaller step, or more points",
+                                          error.worst()));
     else if (wanted > 0 && error.at_end > missed * wanted)
         texts.push_back(
             fmt::format("the scene asks for an error of {:.2g}, and it is {:.2g}; `lobatto tune` chooses a step",
                         wanted, error.at_end));
     if (!error.is_known_at_end())
         texts.push_back(fmt::format(
-            "the error was measured only to t = {:.4g}, because the companion {}; of the rest nothing is known{}",
+            "the error was measured only to t = {:.4g}, because the companion {}; the error of the rest is not known{}",
             error.until, ended_by_caller ? "was not waited for" : "took longer than the run",
             ended_by_caller ? "" : ". Choose an earlier end, or a larger step"));
     return texts;
 }
 
-// That a run which went to its end has left the motion of its Lagrangian. Empty: it has not.
+// That a run which went to its end left the domain of its Lagrangian, or has a wrong energy. Empty: it has not.
 std::string departure_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                          const RunObservers& observers, bool jumps) {
     if (result.status != LOBATTO_OK || result.interrupted) return "";
     if (const std::vector<double>& row = observers.left_domain; !row.empty()) {
         const auto middle = row.begin() + 1 + std::ssize(result.q);
         return fmt::format(
-            "the run left its Lagrangian by t = {:.6g}, q = {}, p = {}: {}, and has no value there. Try an earlier "
-            "end, "
-            "or start elsewhere, or write the formula without it.",
+            "the run left the domain of the Lagrangian by t = {:.6g}, q = {}, p = {}: {}, and has no value there. Try "
+            "an earlier end, or start elsewhere, or write the formula without it.",
             row[0], list_text({row.begin() + 1, middle}), list_text({middle, row.end()}),
             observers.domains.text(observers.parameters, row.data()));
     }
@@ -102,7 +100,7 @@ std::string departure_of(const PreparedRun& run, const TrajectoryRequest& reques
     return departure.empty() ? linear_departure(run.outline, run.scene, run.plain, request, result) : departure;
 }
 
-// Of a run whose steps failed, that left its motion or lost it, or whose energy is no number. Empty: of none.
+// Of a run whose steps failed, that is no longer accurate, or whose energy is no number. Empty: of none.
 std::string failure_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                        const RunObservers& observers, const std::string& departure) {
     const Scene& scene = run.scene;

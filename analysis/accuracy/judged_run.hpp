@@ -124,7 +124,7 @@ struct RunVerdict {
     std::vector<std::string> warnings;   // without full stops
     std::string failure;                 // what went wrong, and what to try; empty: nothing. The scene stands before it
 };
-// `accepts_lost`: that nothing of the motion is left is no failure.
+// `accepts_lost`: an error as large as the motion is no failure.
 RunVerdict verdict_of(const PreparedRun& run, const TrajectoryRequest& request, const TrajectoryResult& result,
                       RunObservers& observers, bool accepts_lost);
 

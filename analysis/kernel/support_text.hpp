@@ -24,7 +24,7 @@ extern const std::string_view kernel_device_host_hpp_text;     // runtime/kernel
 
 // The named parts and those that they include, as one file. Throws std::logic_error for a name that is none.
 std::string support_text(const std::vector<std::string>& names);
-// The parts with those that trajectories side by side stand on too.
+// The parts, with those that trajectories side by side need too.
 std::vector<std::string> with_ensemble(std::vector<std::string> names);
 // And those that end at times of their own.
 std::vector<std::string> with_refilled_ensemble(std::vector<std::string> names);

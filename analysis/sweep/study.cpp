@@ -93,8 +93,7 @@ SweepStudy::SweepStudy(Scene scene, const StartsRequest& starts, const StudyOpti
     apply(options.overrides, scene_);
     if (options.steps && scene_.clock)
         throw InputError(
-            "--steps: with a clock nobody knows beforehand how many steps a trajectory takes; give the end time with "
-            "--until");
+            "--steps: with a clock the number of steps is not known in advance; give the end time with --until");
     if (options.steps && *options.steps < 0)
         throw InputError(fmt::format("--steps: {} is not a number of steps", *options.steps));
     starts_ = std::make_unique<SweepStarts>(scene_, starts, algebra_);
@@ -123,7 +122,7 @@ void SweepStudy::count_steps() {
     if (!scene_.clock && !options_.steps && !scene_.may_end_early() && last_end - first_end > rounding * last_end)
         warnings_.push_back(
             fmt::format("the end time is not a multiple of every step: trajectories end at the last multiple before "
-                        "it, from t = {:.6g} to t = {:.6g}, and differ for that alone",
+                        "it, from t = {:.6g} to t = {:.6g}, so part of the differences comes from the end time",
                         first_end, last_end));
 }
 

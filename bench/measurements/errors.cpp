@@ -34,7 +34,7 @@ constexpr double seconds_a_scene = 60;  // of which the reference takes a part
 constexpr double longest_run = 0.4;     // seconds
 constexpr double longest_finer = 0.04;  // with a companion in finer numbers, for which the run waits
 constexpr double least = 1e-13;         // smaller errors are the rounding of the states themselves
-constexpr double gone = 0.1;            // of the amplitude: what is to be told is that, no longer how much
+constexpr double gone = 0.1;            // of the amplitude: such a run is lost, and has to be reported as that
 constexpr double fewest_radians = 4;    // h omega of the coarsest steps
 constexpr double ratio_of_steps = 1.35;
 constexpr double parts[] = {0.05, 0.5, 0.95, 1};
@@ -59,10 +59,10 @@ bool has(const std::string& file, const std::string& scene) {
 struct Row {
     Member member;
     std::int64_t steps = 0;
-    double true_error = 0;   // of the position that is worst, relative to its amplitude; not a number: it stopped
-    double printed = 0;      // likewise, as the companion finds it
-    bool is_told = false;    // that nothing is left
-    bool is_warned = false;  // that the error is large
+    double true_error = 0;     // of the position that is worst, relative to its amplitude; not a number: it stopped
+    double printed = 0;        // likewise, as the companion finds it
+    bool is_reported = false;  // that it is lost: exit code 3
+    bool is_warned = false;    // that the error is large
 };
 
 // Where the true motion ends: positions, and the amplitude of each.
@@ -152,13 +152,13 @@ void measure(const std::string& path, const std::string& file, std::optional<Pre
             if (ended && row.true_error > 100 * uncertainty) {
                 rows +=
                     fmt::format("{},{},{},{},{:.4g},{:.4g},{},{}\n", scene.name, word_of(member.family), member.points,
-                                row.steps, row.true_error, row.printed, row.is_told ? 1 : 0, row.is_warned ? 1 : 0);
+                                row.steps, row.true_error, row.printed, row.is_reported ? 1 : 0, row.is_warned ? 1 : 0);
                 ++count;
             }
             if (seconds > (finer ? longest_finer : longest_run) || (no_better >= 4 && best < 1e-6)) break;
         }
     }
-    if (count == 0) rows = scene.name + ",,,,,,,\n";  // nobody knows this motion to its end
+    if (count == 0) rows = scene.name + ",,,,,,,\n";  // this motion has no reference to its end
     std::ofstream(file, std::ios::app) << rows << std::flush;
     fmt::print(stderr, "{}: {} runs in {:.0f} s\n", scene.name, count, experiment.elapsed());
 }
@@ -187,17 +187,17 @@ Scenes read(const std::string& path) {
 
 // What is counted of some runs.
 struct Tally {
-    std::vector<double> ratios;  // true over printed, where nothing was told and errors are of interest
-    int lost = 0, told = 0;      // runs whose end is elsewhere, and those of them that were told
-    int missed = 0;              // errors 10 times as large as printed, and more, without a word
+    std::vector<double> ratios;  // true over printed, of runs that were not reported as lost
+    int lost = 0, reported = 0;  // runs whose end is elsewhere, and those of them that were reported
+    int unreported = 0;          // errors 10 times as large as printed, and more, without a warning
 
     void add(const Row& row) {
         const bool is_lost = row.true_error > gone;
         lost += is_lost ? 1 : 0;
-        told += is_lost && (row.is_told || row.is_warned) ? 1 : 0;
-        if (row.is_told || row.true_error < least) return;
+        reported += is_lost && (row.is_reported || row.is_warned) ? 1 : 0;
+        if (row.is_reported || row.true_error < least) return;
         const double ratio = row.true_error / std::fmax(row.printed, 1e-16);
-        if (ratio > 10 && !row.is_warned) ++missed;
+        if (ratio > 10 && !row.is_warned) ++unreported;
         if (!is_lost) ratios.push_back(ratio);
     }
     double share(double from, double to) const {
@@ -214,7 +214,7 @@ std::string table_row(const std::string& name, Tally tally) {
                     ? " – |"
                     : fmt::format(" {:.2g} |", tally.ratios[static_cast<std::size_t>(
                                                    std::lround(part * static_cast<double>(tally.ratios.size() - 1)))]);
-    return text + fmt::format(" {} | {} | {} |\n", tally.lost, tally.told, tally.missed);
+    return text + fmt::format(" {} | {} | {} |\n", tally.lost, tally.reported, tally.unreported);
 }
 
 // Of the rows of one member in one scene: whether rounding decides each. It does from the first small error on that
@@ -237,7 +237,7 @@ std::vector<bool> decided_by_rounding(const std::vector<Row>& rows) {
 }
 
 constexpr const char* header =
-    "| runs | 5 % | 50 % | 95 % | largest | lost | of these told | missed |\n"
+    "| runs | 5 % | 50 % | 95 % | largest | lost | of these reported | unreported |\n"
     "|---|---|---|---|---|---|---|---|---|\n";
 
 // All runs, and of them those whose error the step decides, and those where rounding does.
@@ -261,7 +261,7 @@ struct Summary {
         std::string text;
         for (const auto& [name, tally] : {std::pair{"all", &all}, {"the step", &by_steps}, {"rounding", &by_rounding}})
             text += fmt::format("| {} | {} | {} | {:.1f} % | {:.2f} % | {} |\n", companion, name, tally->ratios.size(),
-                                tally->share(0.5, 2), tally->share(0.1, 10), tally->missed);
+                                tally->share(0.5, 2), tally->share(0.1, 10), tally->unreported);
         return text;
     }
 };
@@ -284,12 +284,12 @@ std::string tables_of(const Scenes& scenes, const Scenes& finer) {
     for (const auto& [member, tally] : of_member) by_member += table_row(Candidate{member, 0, 0}.name(), tally);
     const Summary summary(scenes);
     return fmt::format(
-        "| companion in | error decided by | runs | within a factor of 2 | of 10 | missed "
+        "| companion in | error decided by | runs | within a factor of 2 | of 10 | unreported "
         "|\n|---|---|---|---|---|---|\n"
         "{}{}\n| scene {}{}{}\n| member {}{}{}",
         summary.rows("double"), Summary(finer).rows("double-double"), header, by_scene, table_row("all", summary.all),
         header, by_member,
-        unknown.empty() ? "" : "\nNot here, because nobody knows the motion to its end: " + unknown + ".\n");
+        unknown.empty() ? "" : "\nNot in the table, because there is no reference to its end: " + unknown + ".\n");
 }
 
 // How often which ratio: in per cent of the runs, in bins of a tenth of a decade.

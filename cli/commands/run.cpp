@@ -429,8 +429,9 @@ void add_run(CommandLine& program) {
                 "Numbers of the companion, such as double-double: the error to two digits where rounding decides it, "
                 "too. The run waits for it")
         .shown_as("NUMBERS");
-    command.flag("--beyond-horizon", options->beyond_horizon,
-                 "Go on where nothing of the motion is left, for the statistics of chaos; else that is an error");
+    command.flag(
+        "--beyond-horizon", options->beyond_horizon,
+        "Continue even when the error is as large as the motion, for the statistics of chaos; else that is an error");
     command.flag("--quiet", options->quiet, "Print nothing but warnings and errors");
     add_json_option(command, options->json);
     command.footer("Example:\n  lobatto run scenes/pendulum.toml --step 0.1 --until 100 -o pendulum.csv");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// A remark on standard error, if what goes on while this lives takes long.
+// Prints a message on standard error if its scope lasts long.
 #pragma once
 
 #include <unistd.h>

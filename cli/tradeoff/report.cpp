@@ -33,9 +33,8 @@ std::string reference_text(const Experiment& experiment) {
                                    reference.second, reference.disagreement.back());
     if (experiment.is_chaotic())
         text += fmt::format(
-            "\nThe two disagree: beyond t = {:.4g} nobody knows this motion to {:.0e}. It is chaotic, and errors of "
-            "states mean "
-            "nothing there; look at energy, momenta, and how long a method follows the true motion.",
+            "\nThe two disagree: beyond t = {:.4g} this motion is not known to {:.0e}. It is chaotic, and errors of "
+            "states have no meaning there; look at energy, momenta, and how long a method follows the true motion.",
             reference.trusted_until(trusted), trusted);
     return text;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Which parts of runtime/kernel/kernel.hpp a kernel stands on.
+// Which parts of runtime/kernel/kernel.hpp a kernel needs.
 #pragma once
 
 #include <string>

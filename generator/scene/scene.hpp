@@ -55,7 +55,7 @@ struct Run {
     Position step_at = {};        // where it is written
     GiNaC::ex until;              // end time, >= 0; in parameters
     double error = 0;             // that is wanted, relative to the amplitude of the motion; 0: nothing is said
-    bool beyond_horizon = false;  // goes on where nothing of the motion is left: statistics of chaos
+    bool beyond_horizon = false;  // goes on when the error is as large as the motion: statistics of chaos
     bool assemble = false;        // a start that does not keep the constraints is moved to the nearest that does
     std::vector<Event> stops;     // a run ends at the first of them
 };

@@ -21,8 +21,8 @@ def run(scene, *, measure=True, companion="", beyond_horizon=False, progress=Non
 
     ``measure``: its error, by a companion on another processor. ``companion``: the numbers of that one, such as
     "double-double", which measure the error to two digits where rounding decides it, too. ``beyond_horizon``: go on
-    where nothing of the motion is left, for the statistics of chaos. ``progress(share)`` is called about ten times a
-    second; False ends the run. Raises RunFailure where it fails on its way, with what was computed as its ``trajectory``.
+    when the error is as large as the motion, for the statistics of chaos. ``progress(share)`` is called about ten times
+    a second; False ends the run. Raises RunFailure where it fails on its way, with what was computed as its ``trajectory``.
     """
     scene = _scene(scene)
     settings = copy.deepcopy(settings)  # states between those that are kept are computed later, with these

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A folder of built objects, each found by the text that determines it; safe against crashes and other processes.
+// Derivations are kept in it too: analysis/kernel/derived_kernel.hpp.
 //
 // An entry with stem STEM = NAME-<SHA-256 of the key text, shortened> consists of
 //     STEM.so        the object; other things that are built have other endings

@@ -275,7 +275,7 @@ TEST_CASE("an equilibrium is no motion that is lost, wherever it is") {
         "y = { position = 0, velocity = 0 }\n[method]\npoints = 2\n[run]\nstep = 0.35\nuntil = 200\n");
     const test::Finished thrown = stable.run();
     CHECK(thrown.exit_code == 3);
-    CHECK(test::contains(thrown.err, "or the step too long for it"));
+    CHECK(test::contains(thrown.err, "or the step is too long for it"));
     CHECK(test::contains(thrown.err, "a smaller step, such as h = 0.175"));
     CHECK(stable.run({"--step", "0.1"}).exit_code == 0);
 }

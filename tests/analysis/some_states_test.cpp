@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+// Some states of a run: the first and later ones, spread over all times without a rhythm.
 #include "analysis/accuracy/watch/some_states.hpp"
 
 #include <doctest/doctest.h>

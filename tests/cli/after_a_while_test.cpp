@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+// A message on standard error appears if its scope lasts long, and only then.
 #include "cli/print/after_a_while.hpp"
 
 #include <doctest/doctest.h>

@@ -86,7 +86,7 @@ std::string tour() {
     const std::string emitted = output_of({"emit", scene, "--no-support", "-o", folder.string()});
     text +=
         "\n## 4. The graph and its passes\n\n`generator/programs/` writes down what the kernel computes, as one graph. "
-        "`generator/graph/` rewrites it pass by pass and compares all values at 60 digits.\n\n";
+        "`generator/graph/` rewrites it pass by pass. After each pass all values must be the same to 40 digits.\n\n";
     text += block("", excerpt(emitted, "pass", "Wrote"));
     const std::string header = test::read_file(folder / "pendulum.hpp");
     text +=

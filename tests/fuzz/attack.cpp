@@ -551,8 +551,8 @@ std::optional<Truth> truth_of(const Case& problem, real tolerance, real longest)
 // Comparison
 // ---------------------------------------------------------------------------------------------------------------------
 
-// told: exit code 3. alarm: that, though the motion is known to 1 % where the file ends.
-enum class Outcome { measured, told, alarm, refused, no_truth, miss };
+// reported: exit code 3. false_alarm: that, though the motion is known to 1 % where the file ends.
+enum class Outcome { measured, reported, false_alarm, refused, no_truth, miss };
 
 struct Report {
     Outcome outcome = Outcome::refused;
@@ -582,10 +582,10 @@ Report look_at(const Case& problem) {
     const test::Finished done =
         test::run({"timeout", "60", LOBATTO_PROGRAM, "run", folder / "scene.toml", "-o", folder / "run.csv"});
     report.said = done.out + done.err;
-    const bool is_told = done.exit_code == 3;
+    const bool is_reported = done.exit_code == 3;
     const std::optional<double> printed = printed_error(done.out);
-    if (!is_told && (done.exit_code != 0 || !printed)) return report;
-    report.outcome = is_told ? Outcome::told : Outcome::no_truth;
+    if (!is_reported && (done.exit_code != 0 || !printed)) return report;
+    report.outcome = is_reported ? Outcome::reported : Outcome::no_truth;
     report.printed = printed.value_or(1);
     const auto rows = test::read_trajectory(folder / "run.csv").rows;
     if (std::fabs(rows.back()[0] - problem.step * problem.steps) > problem.step / 2) return report;  // it stopped
@@ -608,8 +608,8 @@ Report look_at(const Case& problem) {
         rounding = std::fmax(rounding, 1e-14 * size / amplitude);
     }
     const bool is_missed = report.truth > 10 * (report.printed + report.doubt + rounding);
-    if (is_told)
-        report.outcome = report.truth + report.doubt < 0.01 ? Outcome::alarm : Outcome::told;
+    if (is_reported)
+        report.outcome = report.truth + report.doubt < 0.01 ? Outcome::false_alarm : Outcome::reported;
     else
         report.outcome = is_missed ? Outcome::miss : Outcome::measured;
     return report;
@@ -646,7 +646,7 @@ int main(int argc, char** argv) {
                 tally.ratios.push_back(report.truth / report.printed);
             const std::map<Outcome, std::string> seen{{Outcome::miss, "SILENT MISS"},
                                                       {Outcome::refused, "refused"},
-                                                      {Outcome::alarm, "told, but right at the end"}};
+                                                      {Outcome::false_alarm, "exit code 3, but right at the end"}};
             if (seen.contains(report.outcome))
                 fmt::print("{} {}, {}: true {:.2e}, printed {:.2e}, doubt {:.1e}\n{}{}\n",
                            seed + static_cast<std::uint64_t>(i), kind, seen.at(report.outcome), report.truth,
@@ -657,8 +657,8 @@ int main(int argc, char** argv) {
     for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i) threads.emplace_back(work);
     for (std::thread& thread : threads) thread.join();
 
-    fmt::print("{:12} {:>9} {:>6} {:>12} {:>8} {:>9} {:>7}   true/printed: 5 %, median, 95 %, largest\n", "class",
-               "measured", "told", "told, right", "refused", "no truth", "misses");
+    fmt::print("{:12} {:>9} {:>8} {:>12} {:>8} {:>9} {:>7}   true/printed: 5 %, median, 95 %, largest\n", "class",
+               "measured", "reported", "false alarms", "refused", "no truth", "misses");
     int misses = 0;
     for (auto& [kind, tally] : tallies) {
         std::sort(tally.ratios.begin(), tally.ratios.end());
@@ -667,8 +667,8 @@ int main(int argc, char** argv) {
                                   : ratios[static_cast<std::size_t>(share * static_cast<double>(ratios.size() - 1))];
         };
         misses += tally.count[Outcome::miss];
-        fmt::print("{:12} {:9} {:6} {:12} {:8} {:9} {:7}   {:.2g} {:.2g} {:.2g} {:.2g}\n", kind,
-                   tally.count[Outcome::measured], tally.count[Outcome::told], tally.count[Outcome::alarm],
+        fmt::print("{:12} {:9} {:8} {:12} {:8} {:9} {:7}   {:.2g} {:.2g} {:.2g} {:.2g}\n", kind,
+                   tally.count[Outcome::measured], tally.count[Outcome::reported], tally.count[Outcome::false_alarm],
                    tally.count[Outcome::refused], tally.count[Outcome::no_truth], tally.count[Outcome::miss],
                    part(0.05), part(0.5), part(0.95), part(1));
     }

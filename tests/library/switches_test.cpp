@@ -126,7 +126,7 @@ TEST_CASE("multipliers and conditions of formulas are on the side where the moti
     CHECK(above > 20);
     CHECK(below > 20);
 
-    // Defect once: "the run left its Lagrangian", where 1 + 3 x of the first side was negative.
+    // Defect once: "the run left the domain of the Lagrangian", where 1 + 3 x of the first side was negative.
     CHECK(failure_of(scene_of("lagrangian = \"x'^2/2 - sqrt(1 + 3*abs(x))^2\"\n[coordinates]\n"
                               "x = { position = 2, velocity = 0 }\n[run]\nstep = 0.02\nuntil = 10\n"))
               .empty());

@@ -54,8 +54,8 @@ inline constexpr double finer_iteration = 1e-3;
 
 class Companion {
 public:
-    // What is handed over is copied, but for what the kernel needs. `request`: the run's; its whole numbers are those
-    // of `kernel`, which are the run's too, or finer. `run_epsilon`: of the run's.
+    // All arguments are copied; `kernel` shares its library. `request`: the run's; its whole numbers are those of
+    // `kernel`, which are the run's too, or finer. `run_epsilon`: of the run's.
     Companion(const Outline& outline, const Kernel& kernel, const TrajectoryRequest& request, double run_epsilon);
     ~Companion();
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The error of a run as its companion has measured it, and the line that is printed of it.
+// The measured error of a run, as numbers and as the printed line. It is computed elsewhere: of a run by
+// Companion::compare (comparison.cpp), of the trajectories of a sweep in ensemble_companion.cpp.
 #pragma once
 
 #include <cmath>

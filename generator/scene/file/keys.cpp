@@ -42,7 +42,7 @@ Key lines(const std::string& name, const std::string& help, std::vector<Key> key
 
 // Types of numbers by name, and "50 digits".
 Key numbers_key() {
-    Key one = word("numbers", {}, "What the steps are computed in");
+    Key one = word("numbers", {}, "The number type of the steps");
     for (const Precision precision : all_precisions) one.words.push_back(precision_name(precision));
     one.pattern = "^(2[0-9]|[3-9][0-9]|1[0-3][0-9]|140) digits$";
     return one;
@@ -79,7 +79,7 @@ std::vector<Key> make_keys() {
                key("momentum", Holds::formulas, "The momentum at the start, instead of the velocity")}),
         lines("parameters", "Numbers that formulas use by name",
               {required(key("value", Holds::formulas, "The value, or a list of them")), unit_key,
-               key("constant", Holds::truth, "True: put into all formulas before anything is derived")},
+               key("constant", Holds::truth, "True: substituted into all formulas before the derivation")},
               true),
         lines("inputs", "Numbers that a host program may change before each step, such as the torque of a motor",
               {required(key("value", Holds::formulas, "The value of runs and sweeps, or a list of them")), unit_key},
@@ -97,8 +97,8 @@ std::vector<Key> make_keys() {
                key("angle", Holds::formula, "The angle of a body in a plane"),
                key("velocity", Holds::list, "Of the centre of mass"),
                key("angular_velocity", Holds::formulas, "In the frame of the body")}),
-        lines("joints", "What joins two bodies", joint_keys()),
-        lines("impacts", "Walls at which the motion is thrown back",
+        lines("joints", "Joints between two bodies", joint_keys()),
+        lines("impacts", "Walls at which the motion bounces, and resets at times and places",
               {required(key("when", Holds::quoted, "The wall and its side, such as \"y = 0 falling\"")), count_key,
                key("restitution", Holds::formula, "The part of the normal velocity that is given back, 0 to 1"),
                key("rest", Holds::formula, "The run ends at an impact that the motion leaves more slowly than this"),
@@ -113,16 +113,17 @@ std::vector<Key> make_keys() {
              key("tolerance", Holds::formula, "Where the iteration of a step stops; without it at rounding"),
              word("arithmetic", {"plain", "clean"}, "Clean: rounding errors grow like a random walk"), numbers_key(),
              key("clock", Holds::formula, "The time step's factor, a formula of positions and the time, or \"auto\"")}),
-        required(section("run", "From the start to the end",
-                         {key("step", Holds::formula, "The step"),
-                          whole("steps_per_period", 1, most_steps, "Instead of the step, with the period"),
-                          key("period", Holds::formula, "The period that has these steps"),
-                          required(key("until", Holds::formula, "The end time")),
-                          key("error", Holds::formula, "The error that `lobatto tune` promised"),
-                          key("beyond_horizon", Holds::truth, "True: go on where nothing of a motion is known"),
-                          key("assemble", Holds::truth, "True: take the nearest start that keeps the constraints"),
-                          key("stop", Holds::events, "Where the run ends early, such as \"y = 0 falling\"")})),
-        section("output", "What is kept of a run",
+        required(
+            section("run", "From the start to the end",
+                    {key("step", Holds::formula, "The step"),
+                     whole("steps_per_period", 1, most_steps, "Instead of the step, with the period"),
+                     key("period", Holds::formula, "The period that has these steps"),
+                     required(key("until", Holds::formula, "The end time")),
+                     key("error", Holds::formula, "The accepted error, relative to the amplitude of the motion"),
+                     key("beyond_horizon", Holds::truth, "True: go on even when the error is as large as the motion"),
+                     key("assemble", Holds::truth, "True: take the nearest start that keeps the constraints"),
+                     key("stop", Holds::events, "Where the run ends early, such as \"y = 0 falling\"")})),
+        section("output", "What is written of a run",
                 {key("every", Holds::formula, "Keep every N-th state; with a clock the time between two of them"),
                  key("energy", Holds::truth, "Whether the energy is a column"),
                  key("momenta", Holds::truth, "Whether the momenta are columns"),
@@ -131,9 +132,9 @@ std::vector<Key> make_keys() {
                  key("multipliers", Holds::truth, "Whether the multipliers of constraints are columns"),
                  key("tangent", Holds::truth, "Whether the derivative of a step is in the kernel"),
                  whole("dense", 0, 100, "States between two steps, on the polynomial of the step"),
-                 key("events", Holds::events, "What is looked for, such as \"x = 0 rising\""),
-                 key("keep", Holds::events, "What a sweep keeps of each trajectory, such as \"max(x)\"")}),
-        lines("view", "What moves on the page of `lobatto view`; plot names its curves",
+                 key("events", Holds::events, "Events whose times are written, such as \"x = 0 rising\""),
+                 key("keep", Holds::events, "Numbers that a sweep keeps of each trajectory, such as \"max(x)\"")}),
+        lines("view", "Figures of the page of `lobatto view`; plot names its curves",
               {key("point", Holds::place, "A dot that moves"), key("line", Holds::places, "A line through places"),
                key("spring", Holds::places, "A spring between two places"),
                key("circle", Holds::place, "A circle about a place"), key("radius", Holds::formula, "Of the circle"),

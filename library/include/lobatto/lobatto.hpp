@@ -285,7 +285,7 @@ private:
 struct RunOptions : Settings {
     bool measure = true;          ///< the error, by a companion on another processor
     std::string companion;        ///< its numbers, such as "double-double"; empty: those of the run (docs/errors.md)
-    bool beyond_horizon = false;  ///< go on where nothing of the motion is left
+    bool beyond_horizon = false;  ///< go on when the error is as large as the motion
     /// About ten times a second, from 0 to 1; false ends the run, and what was computed is returned.
     std::function<bool(double)> progress;
 };

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Many trajectories of one kernel: side by side in its lanes, shared by threads, handed over in their order.
+// Many trajectories of one kernel: side by side in its lanes, shared by threads, handed over in their order. This is
+// the work of the host. The lanes themselves are in the kernel library (runtime/kernel/steppers/ensemble.hpp), which
+// analysis/kernel/kernel_of.cpp compiled for them.
 //
 // What a trajectory becomes depends on nothing but its own start: not on the number of threads, not on the others of
 // the ensemble. So everything here is bit-identical for any number of threads. Where a kernel has no lanes, a

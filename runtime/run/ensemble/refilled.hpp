@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Trajectories of an ensemble in lanes that are refilled: each ends at a time of its own, at a stop or where it fails,
-// and every state of it may be looked at; or has a clock, and as many steps as it takes.
+// and every state of it may be looked at; or has a clock, and as many steps as it takes. The lanes themselves are
+// runtime/kernel/steppers/refilled.hpp and clocked_lanes.hpp.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
+// The summands of a formula: the terms of all sums in it, with their effect on the whole.
 #include "generator/mechanics/algebra/summands.hpp"
 
 #include <doctest/doctest.h>
