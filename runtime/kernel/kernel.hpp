@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What emitted kernels stand on: Stepper<K>, the life in time of a kernel K. C++17, no allocation.
+// What emitted kernels stand on: Stepper<K> advances one trajectory of a kernel K. C++17; steps allocate nothing.
 #ifndef LOBATTO_KERNEL_HPP
 #define LOBATTO_KERNEL_HPP
 
@@ -22,13 +22,13 @@
 #include "base/spline.hpp"
 #include "base/trigonometry.hpp"
 #include "iteration/constrained_fixed_point.hpp"
+#include "iteration/constraint_checks.hpp"
 #include "iteration/convergence.hpp"
 #include "iteration/ensemble_fixed_point.hpp"
 #include "iteration/ensemble_tables.hpp"
 #include "iteration/extrapolation.hpp"
 #include "iteration/fixed_point.hpp"
 #include "iteration/galerkin.hpp"
-#include "iteration/galerkin_constraints.hpp"
 #include "iteration/galerkin_equations.hpp"
 #include "iteration/galerkin_newton.hpp"
 #include "iteration/galerkin_tables.hpp"

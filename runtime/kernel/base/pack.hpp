@@ -310,8 +310,7 @@ struct Bits {
     }
 };
 
-// These two, like the functions of base/trigonometry.hpp and its kin, are also found by their full names lobatto::sqrt,
-// lobatto::fabs.
+// Templates outside Pack, like the functions of base/trigonometry.hpp, so that lobatto::sqrt(x) finds them.
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> sqrt(const Pack<real, width>& a) {
     using Numbers = Pack<real, width>;

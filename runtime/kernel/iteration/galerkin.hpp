@@ -4,8 +4,8 @@
 // With V, P = dL/dv and F = dL/dq + forces at the r nodes, A the matrix that integrates over the node polynomials,
 // A'_ij = b_j (1 - A_ji / b_i), and pi the Legendre polynomial of degree r - 1 for Lobatto's nodes, nothing for
 // Gauss's, the Galerkin equations (D28) are (D35)
-//     Q_i = q + h sum_j A_ij V_j,   P_i = p + h sum_j A'_ij F_j + kappa pi_i,   P_i = L_v(Q_i, V_i),   sum_i b_i pi_i
-//     V_i = 0 q1 = q + h sum_j b_j V_j,     p1 = p + h sum_j b_j F_j
+//     Q_i = q + h sum_j A_ij V_j,   P_i = p + h sum_j A'_ij F_j + kappa pi_i,   P_i = L_v(Q_i, V_i),
+//     q1 = q + h sum_j b_j V_j,     p1 = p + h sum_j b_j F_j,                   sum_i b_i pi_i V_i = 0
 // An iteration takes F, L_v and M = L_vv at all nodes, then P, then V <- V + M^-1 (P - L_v) with the kappa that keeps
 // the last sum zero, then Q: where M varies little it contracts like h^2, not like h, because Q is new in every
 // iteration. Angles are taken from those at the start of the step (base/angles.hpp). Where velocities are formulas of
@@ -276,39 +276,14 @@ private:
             return fabs(worst);
     }
 
-    // The same for masses that do not couple coordinates, or do so by M0 alone, which drops out: kappa = M0 d is found
-    // anew, and P does not hold it.
-    LOBATTO_INLINE void correct_each(T* kappa_now, Arrays& a) {
-        V weighted[parts], moved[parts * mass_room];  // h b pi, M^-1 pi
-        T share[mass_room], d[n];
-        for (int part = 0; part < parts; ++part) weighted[part] = weight[part] * legendre[part];
-#pragma GCC unroll 8
-        for (int c = 0; c < mass_room; ++c) {
-            for (int part = 0; part < parts; ++part)
-                moved[part * mass_room + c] = legendre[part] * a.M[part * mass_room + c];
-            share[c] = T(real(-1)) / over_nodes(weighted, moved + c, mass_room);
-        }
-#pragma GCC unroll 8
-        for (int c = 0; c < n; ++c) {
-            const int of = c < mass_room ? c : 0;
-            d[c] = share[of] * over_nodes(weighted, a.Lv + c, n);
-            for (int part = 0; part < parts; ++part) {
-                V& x = a.Lv[part * n + c];
-                x = fused(moved[part * mass_room + of], V(d[c]), x);
-            }
-        }
-        mass.momentum_of(d, kappa_now);
-    }
-
     // kappa <- kappa + d, V <- V + M^-1 pi d with sum b pi V = 0.
     LOBATTO_INLINE void correct(T* kappa_now, Arrays& a) {
         V weighted[parts];  // h b pi
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) weighted[part] = weight[part] * legendre[part];
-        T S[n * n], d[n];
+        T S[n * n], d[n];  // S = sum h b pi^2 M^-1, column by column
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) d[c] = -over_nodes(weighted, a.Lv + c, n);
-            // S = sum h b pi^2 M^-1, column by column.
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             V columns[parts * n];
@@ -334,6 +309,30 @@ private:
         }
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) kappa_now[c] += d[c];
+    }
+
+    // The same for masses that do not couple coordinates, or do so by M0 alone, which drops out: kappa = M0 d is found
+    // anew, and P does not hold it.
+    LOBATTO_INLINE void correct_each(T* kappa_now, Arrays& a) {
+        V weighted[parts], moved[parts * mass_room];  // h b pi, M^-1 pi
+        T share[mass_room], d[n];
+        for (int part = 0; part < parts; ++part) weighted[part] = weight[part] * legendre[part];
+#pragma GCC unroll 8
+        for (int c = 0; c < mass_room; ++c) {
+            for (int part = 0; part < parts; ++part)
+                moved[part * mass_room + c] = legendre[part] * a.M[part * mass_room + c];
+            share[c] = T(real(-1)) / over_nodes(weighted, moved + c, mass_room);
+        }
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            const int of = c < mass_room ? c : 0;
+            d[c] = share[of] * over_nodes(weighted, a.Lv + c, n);
+            for (int part = 0; part < parts; ++part) {
+                V& x = a.Lv[part * n + c];
+                x = fused(moved[part * mass_room + of], V(d[c]), x);
+            }
+        }
+        mass.momentum_of(d, kappa_now);
     }
 
     template <class Given, class Time>

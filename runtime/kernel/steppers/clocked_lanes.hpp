@@ -3,8 +3,8 @@
 // steps. A lane whose trajectory has ended takes the next one.
 //
 // A trajectory arrives at the times start + interval, start + 2 interval, ... Lanes whose step has passed such a time
-// shorten it together (steppers/shortened.hpp), where somebody asks for the state. Of other arrivals a lane keeps the
-// step that passed the last one: its state is the last good one of a motion that fails.
+// shorten it together (steppers/shortened.hpp), where the state is output. For arrivals without output a lane stores
+// only the step that passed the latest one: its state is the last good one of a motion that fails.
 #ifndef LOBATTO_KERNEL_CLOCKED_LANES_HPP
 #define LOBATTO_KERNEL_CLOCKED_LANES_HPP
 
@@ -21,13 +21,13 @@ struct ClockedEnsemble : Ensemble<K, width> {
     using typename Base::real, typename Base::T, typename Base::ActiveMask;
     static constexpr int columns = 1 + 2 * n;
     static constexpr std::int64_t most_steps = 4096;     // of the chain in one call
-    static constexpr std::int64_t most_skipped = 65536;  // times that lanes leave arrivals nobody asks for, likewise
+    static constexpr std::int64_t most_skipped = 65536;  // times that lanes pass arrivals without output, likewise
     // To shorten a step takes about as long as two steps, for one lane as for all. So lanes wait for each other.
     static constexpr int most_waited = 2 * width;
 
     LongTime<T> now, before;  // of the chain: where it is, and a step ago
     T q_before[n], p_before[n];
-    LongTime<T> passed;  // the start of the step that passed the last arrival of those that nobody asked for
+    LongTime<T> passed;  // the start of the step that passed the latest arrival without output
     T q_passed[n], p_passed[n];
     T target;  // the time of the next arrival
     real origin[width]{}, tolerance{}, interval{}, end{};
@@ -178,7 +178,7 @@ private:
         return watch.keeps_energy(single, q, p);
     }
 
-    // Leaves those of the lanes that arrive where somebody asks for their states; whether there were others.
+    // Leaves those of the lanes that arrive whose states are output; whether there were others.
     template <class Call>
     bool skip(const Call& call, ActiveMask& arriving) {
         ActiveMask skipped = arriving;

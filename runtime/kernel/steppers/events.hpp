@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where event functions change their sign between two steps.
+// Locates, inside one step, where a watched function changes sign: events, stops, walls, switches.
 //
 // An event of g(t, q, q') = 0 happens where the sign of g changes. Its places are isolated on the step's polynomial: g
 // is sampled at twice as many pieces as the step has nodes, and between samples where |g| is least. What decides is

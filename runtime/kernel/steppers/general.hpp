@@ -10,16 +10,16 @@
 #include "../base/dense.hpp"
 #include "../base/numbers.hpp"
 #include "../iteration/constrained_fixed_point.hpp"
+#include "../iteration/constraint_checks.hpp"
 #include "../iteration/extrapolation.hpp"
 #include "../iteration/galerkin.hpp"
-#include "../iteration/galerkin_constraints.hpp"
 #include "../iteration/velocity_of_momentum.hpp"
 
 namespace lobatto {
 
 template <class K>
-struct Stepper<K, Form::general, Stepping::solved> : GalerkinConstraints<K> {
-    using Newton = GalerkinConstraints<K>;
+struct Stepper<K, Form::general, Stepping::solved> : ConstraintChecks<K> {
+    using Newton = ConstraintChecks<K>;
     using Newton::multiplier_room;
     using Newton::n, Newton::active, Newton::constraints, Newton::cyclic, Newton::Z, Newton::r, Newton::m,
         Newton::kappas, Newton::N, Newton::room, Newton::entry_room, Newton::cyclic_room, Newton::coefficients,

@@ -2,10 +2,11 @@
 // What refilled lanes ask of the lane stepper of each form: that a trajectory begins in a lane while others go on, the
 // polynomial of its last step, and the loan of that step to a Stepper.
 //
-// refill(motion, single, lane) begins at the start of `single`. displacements(...) gives what the positions of the
-// step are made of: with the basis of the form's Stepper, q(theta) = q_before + sum_j value_j(theta) moved_j. momenta
-// are those of rates; velocities those at its end: velocities answers in which lanes they are known. lend_state gives
-// one lane's state, lend_step one lane's step from the state that was lent.
+//   refill: begins in a lane at the start of `single`.
+//   displacements: with the basis of the form's Stepper, q(theta) = q_before + sum_j value_j(theta) moved_j in the
+//   step. momenta: those of rates. velocities: those at the end of the step; answers in which lanes they are known.
+//   lend_state: gives one lane's state to a Stepper.
+//   lend_step: gives it the lane's step from that state.
 #ifndef LOBATTO_KERNEL_LENT_STEPS_HPP
 #define LOBATTO_KERNEL_LENT_STEPS_HPP
 

@@ -4,10 +4,10 @@
 // K::events functions are watched: first events, then the K::stops, which end the motion, then walls (walls.hpp). The
 // motion stays on one side of a wall until it meets it; a value that is only rounding counts as zero. K::impacts walls
 // throw the motion back. The last K::switches walls change its formulas; their sides, 1 or -1, are the last parameters.
-// impact(k, q, G, g_t, e, rest) gives dg/dq, dg/dt at fixed q and the restitution of each wall, and the speed below
-// which the motion comes to rest there and ends. Where reset_of[] of it is not below 0, reset(k, q, velocity, q1,
-// velocity1) gives the state after that one of the K::resets. Where passage_of[] is not 0, the motion passes: its reset
-// is for crossings with g rising (1), falling (-1) or both (2). K::passages is how many these are.
+// impact(k, q, G, g_t, e, rest) gives dg/dq, dg/dt at fixed q and the restitution of each wall w, and the speed below
+// which the motion comes to rest there and ends. If reset_of[w] >= 0, reset(k, q, velocity, q1, velocity1) gives the
+// state after it, that one of the K::resets. If passage_of[w] is not 0, the motion passes: its reset is for crossings
+// with g rising (1), falling (-1) or both (2). K::passages is how many these are.
 #ifndef LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 #define LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Whether a start keeps the constraints, and the end of a step that Newton's iteration has taken.
-#ifndef LOBATTO_KERNEL_GALERKIN_CONSTRAINTS_HPP
-#define LOBATTO_KERNEL_GALERKIN_CONSTRAINTS_HPP
+// Checks that a start keeps the constraints, and the end of a step that Newton's iteration has taken.
+#ifndef LOBATTO_KERNEL_CONSTRAINT_CHECKS_HPP
+#define LOBATTO_KERNEL_CONSTRAINT_CHECKS_HPP
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
@@ -11,7 +11,7 @@
 namespace lobatto {
 
 template <class K>
-struct GalerkinConstraints : GalerkinNewton<K> {
+struct ConstraintChecks : GalerkinNewton<K> {
     using Newton = GalerkinNewton<K>;
     using Newton::n, Newton::active, Newton::constraints, Newton::Z, Newton::r, Newton::coefficients, Newton::step_size,
         Newton::q, Newton::p;
