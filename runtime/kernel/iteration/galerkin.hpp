@@ -76,7 +76,7 @@ struct GalerkinFixedPoint : GalerkinTables<K, T> {
     // One step of the lanes that are `active`, h from `time`, one number or one a lane. The lanes that the answer names
     // have moved; the others stay.
     template <class Given, class Time>
-    LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, T* q, T* p, ActiveMask active) {
+    LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, T* q, T* p, ActiveMask active = ActiveMask(true)) {
         return workspace.with([&](Arrays& a) { return step_in(k, time, q, p, active, a); });
     }
 

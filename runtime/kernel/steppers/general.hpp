@@ -244,10 +244,10 @@ private:
     }
 
     template <class AnyFixedPoint>
-    void begin_fixed_point(AnyFixedPoint& any, const real* v) {
+    void begin_fixed_point(AnyFixedPoint& any, [[maybe_unused]] const real* v) {
         any.pause = Pause();
         if constexpr (iterates_on_constraints)
-            any.iteration.begin(v);
+            any.iteration.has_history = false;
         else
             any.iteration.begin(coefficients, this->time(), q, v);
     }
@@ -257,14 +257,17 @@ private:
     bool iterate(AnyFixedPoint& any) {
         const bool paused = any.pause.left > 0;
         if (!any.pause.count_down()) return false;
-        if (paused) any.iteration.recall([this](int c, int i) { return node_velocity(c, i); });
+        if constexpr (iterates_on_constraints)
+            any.iteration.has_history = any.iteration.has_history && !paused;
+        else if (paused)
+            any.iteration.recall([this](int c, int i) { return node_velocity(c, i); });
         real q1[n], p1[n];
         for (int k = 0; k < n; ++k) {
             q1[k] = q[k];
             p1[k] = p[k];
         }
         any.iteration.tolerance = this->tolerance;
-        if (any.iteration.step(coefficients, this->time(), q1, p1, true)) {
+        if (any.iteration.step(coefficients, this->time(), q1, p1)) {
             for (int k = 0; k < n; ++k) {
                 q_before[k] = q[k];
                 q[k] = q1[k];
