@@ -79,9 +79,12 @@ struct Formulas {
     LOBATTO_WITH_TIME(event)
     LOBATTO_WITH_TIME(impact)
     LOBATTO_WITH_TIME(reset)
+    LOBATTO_WITH_TIME(refraction)
     LOBATTO_WITH_TIME(energy)
     LOBATTO_WITH_TIME(clock)
     LOBATTO_WITH_TIME(constraint)
+    LOBATTO_WITH_TIME(constraint_summands)
+    LOBATTO_WITH_TIME(momentum_summands)
     LOBATTO_WITH_TIME(multiplier_terms)
     // Along rows of coordinates, in the way How (base/rows.hpp).
     template <class How, class Given, class Time, class Position, class Slope>

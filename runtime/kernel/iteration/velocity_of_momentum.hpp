@@ -215,10 +215,7 @@ private:
         });
         if constexpr (MomentaCancel<K>::value) {
             real T[K::momentum_summand_count];
-            if constexpr (K::autonomous)
-                K::momentum_summands(at.k, at.q, a.x, T);
-            else
-                K::momentum_summands(at.k, at.time, at.q, a.x, T);
+            Formulas<K>::momentum_summands(at.k, at.time, at.q, a.x, +T);
             for (int e = 0; e < K::momentum_summand_count; ++e)
                 size[K::momentum_summand_row[e]] += real(0.5) * fabs(T[e]);
         }

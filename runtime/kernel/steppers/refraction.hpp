@@ -30,10 +30,7 @@ struct Surface {
     const real* slope{};  // du/dq; the rate is du/dt at fixed q
 
     Surface(const WatchedStepper<K>& stepper, int number, real time, const real* q) {
-        if constexpr (K::autonomous)
-            K::refraction(stepper.coefficients, q, +slopes, +rates);
-        else
-            K::refraction(stepper.coefficients, time, q, +slopes, +rates);
+        Formulas<K>::refraction(stepper.coefficients, time, q, +slopes, +rates);
         slope = slopes + K::refraction_of[number] * n;
         rate = rates[K::refraction_of[number]];
     }
