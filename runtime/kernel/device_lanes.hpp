@@ -98,12 +98,11 @@ private:
     }
 };
 
-struct NothingKept {};
 struct NoPlaces {
     void prepare() {}
 };
 template <class K>
-using KeptBy = std::conditional_t<(KeptFormulas::parts > 0), KeptOfLane<K>, NothingKept>;
+using KeptBy = std::conditional_t<(KeptFormulas::parts > 0), KeptOfLane<K>, Nothing>;
 template <class K>
 using PlacesOfLanes = std::conditional_t<(K::events > 0), SamplePlaces<K>, NoPlaces>;
 

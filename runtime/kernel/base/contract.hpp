@@ -273,11 +273,13 @@ struct Pause {
     }
 };
 
+// In place of what a kernel does not need.
+struct Nothing {};
+
 // Room for a step's arrays: on the stack while they are few, else in the stepper. In line, so that they are registers
 // where there are enough, and what the step refers to need not lie in memory for a call.
 template <class Arrays>
 struct Workspace {
-    struct Nothing {};
     static constexpr bool is_large = sizeof(Arrays) > 16384;
     mutable std::conditional_t<is_large, Arrays, Nothing> kept{};
 

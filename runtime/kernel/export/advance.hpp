@@ -18,7 +18,6 @@ struct Advance {
 
     static real* out(void* numbers) { return static_cast<real*>(numbers); }
 
-    struct NoWatch {};
     static void count(const S& stepper, lobatto_advance& call) {
         if constexpr (S::N > 0) {
             call.iterations += stepper.iterations;
@@ -31,7 +30,7 @@ struct Advance {
     // Arrivals at equally spaced times, of a stepper with a clock. What does not fit into one call goes on in the next.
     template <class AnyWatch>
     static Status take_intervals(S& stepper, lobatto_advance& call, AnyWatch* watch) {
-        constexpr bool is_watched = !std::is_same_v<AnyWatch, NoWatch>;
+        constexpr bool is_watched = !std::is_same_v<AnyWatch, Nothing>;
         constexpr std::int64_t most = 65536;  // steps of the chain in one call
         stepper.tolerance = static_cast<real>(call.tolerance);
         const real end = static_cast<real>(call.end), interval = static_cast<real>(call.interval);
@@ -105,7 +104,7 @@ struct Advance {
     }
     template <class AnyWatch>
     static Status take_equal_steps(S& stepper, lobatto_advance& call, AnyWatch* watch) {
-        constexpr bool is_watched = !std::is_same_v<AnyWatch, NoWatch>;
+        constexpr bool is_watched = !std::is_same_v<AnyWatch, Nothing>;
         stepper.tolerance = static_cast<real>(call.tolerance);
         std::int64_t until_record = call.record_every > 0 ? call.record_every - stepper.steps % call.record_every : -1;
         for (std::int64_t i = 0; i < call.steps; ++i) {

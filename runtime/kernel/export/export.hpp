@@ -127,7 +127,7 @@ struct Export {
                 return Taken::take_steps(stepper, call, &watch);
             }
         }
-        return Taken::take_steps(stepper, call, static_cast<typename Taken::NoWatch*>(nullptr));
+        return Taken::take_steps(stepper, call, static_cast<Nothing*>(nullptr));
     }
 
     static void state(const void* stepper, void* time, void* q, void* p) {

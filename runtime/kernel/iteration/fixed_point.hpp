@@ -23,7 +23,7 @@ namespace lobatto {
 template <class K, class real = typename K::real>
 struct RefinementOf {
     static constexpr bool exists = false;
-    struct type {};
+    using type = Nothing;
 };
 
 template <class K>

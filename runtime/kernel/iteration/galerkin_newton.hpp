@@ -28,7 +28,6 @@ protected:
     using Equations::apply_node_map, Equations::node_variables, Equations::evaluate_nodes, Equations::sum_over_nodes,
         Equations::assemble, Equations::carry;
 
-    struct Nothing {};
     struct Frozen {
         Matrix matrix;
         real H[entry_room];

@@ -81,7 +81,6 @@ private:
         real S[entry_room];
         bool usable, is_factored;
     };
-    struct Nothing {};
 
     static real node_time(real time, real h, int i) { return time + K::c[i + 1] * h; }
 

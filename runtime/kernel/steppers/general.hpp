@@ -24,7 +24,7 @@ struct Stepper<K, Form::general, Stepping::solved> : ConstraintChecks<K> {
     using Newton::n, Newton::active, Newton::constraints, Newton::cyclic, Newton::Z, Newton::r, Newton::m,
         Newton::kappas, Newton::N, Newton::room, Newton::entry_room, Newton::cyclic_room, Newton::coefficients,
         Newton::step_size, Newton::q, Newton::p, Newton::iterations, Newton::increment, Newton::workspace;
-    using typename Newton::real, typename Newton::Arrays, typename Newton::Layout, typename Newton::Nothing;
+    using typename Newton::real, typename Newton::Arrays, typename Newton::Layout;
     static constexpr int nodes = K::nodes;
 
     // Fixed-point iterations need the mass matrix of a node alone, which is full for them unless it is light.

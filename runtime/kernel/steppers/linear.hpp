@@ -117,7 +117,6 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : ConstantMass<K> {
     // Of a few coordinates and more, the rows of Phi - I lie in lanes, column after column.
     static constexpr int width = native_lanes<real>, rows = (2 * n + width - 1) / width * width;
     static constexpr bool in_lanes = n >= 4 && width > 1;
-    struct Nothing {};
     real p[n]{};  // momentum
     std::conditional_t<in_lanes, real[(2 * n + 1) * rows], Nothing> columns{};
 

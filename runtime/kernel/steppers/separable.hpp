@@ -41,7 +41,6 @@ struct Stepper<K, Form::separable, Stepping::solved> : VelocityKept<K> {
     static constexpr bool has_fixed_point = N > 0 && K::any_number && !K::linear && !K::clean;
     static constexpr bool along_coordinates = has_fixed_point && lobatto::along_coordinates<K>();
 
-    struct Nothing {};
     struct Arrays : Newton::Arrays {
         real q1[n], u1[n], W1[n];  // the end of the step
     };

@@ -197,7 +197,7 @@ struct NeighbourCompositionOf {
 };
 template <class K>
 struct NeighbourCompositionOf<K, false> {
-    struct type {};
+    using type = Nothing;
 };
 
 template <class K>
@@ -214,7 +214,6 @@ struct Stepper<K, Form::separable, Stepping::composition> : VelocityKept<K> {
         std::int64_t of{-1};  // this many steps since start; -1: not computed
         real W[2][n]{};
     };
-    using Nothing = typename NeighbourCompositionOf<K, false>::type;
 
     Composition<K> composition{};
     real W[n]{};                        // M^-1 grad V at q, where ends are kicked; not of neighbours
