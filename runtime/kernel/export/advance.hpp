@@ -21,9 +21,8 @@ struct Advance {
     static void count(const S& stepper, lobatto_advance& call) {
         if constexpr (S::N > 0) {
             call.iterations += stepper.iterations;
-            if (stepper.iterations > call.iterations_most) call.iterations_most = stepper.iterations;
-            if (static_cast<double>(stepper.increment) > call.increment_largest)
-                call.increment_largest = static_cast<double>(stepper.increment);
+            call.iterations_most = maximum(stepper.iterations, call.iterations_most);
+            call.increment_largest = maximum(static_cast<double>(stepper.increment), call.increment_largest);
         }
     }
 

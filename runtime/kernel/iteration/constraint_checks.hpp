@@ -5,6 +5,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "constraint_rounding.hpp"
 #include "galerkin_newton.hpp"
 
@@ -71,8 +72,8 @@ protected:
             real largest = real(0), apart = real(0), pushed = real(0), Lv[n], Lq[n];
             Formulas<K>::slopes(coefficients, this->time(), q, v, Lv, Lq);
             for (int k = 0; k < n; ++k) {
-                largest = fabs(p[k]) > largest ? fabs(p[k]) : largest;
-                apart = fabs(force[k]) > apart ? fabs(force[k]) : apart;
+                largest = maximum(fabs(p[k]), largest);
+                apart = maximum(fabs(force[k]), apart);
                 pushed = maximum(pushed, fabs(longest_step * Lq[k]));
             }
             const real rounding = real(64) * Limits<real>::epsilon * pushed;  // at rest steps leave that

@@ -59,7 +59,7 @@ struct FixedPoint : StageMap<K, typename K::real> {
         for (int i = 0; i <= m; ++i) {
             real sum = real(0);
             for (int j = 0; j < m; ++j) sum += fabs(row(i, j));
-            norm = sum > norm ? sum : norm;
+            norm = maximum(sum, norm);
         }
         twentieth_norm = h * h * norm / real(20);
     }

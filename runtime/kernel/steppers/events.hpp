@@ -11,6 +11,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "sampled_function.hpp"
 #include "watched_stepper.hpp"
 
@@ -294,7 +295,7 @@ private:
             const real value = samples[sample_at(j)].value;
             if (!has_sign(value) || changes(value, samples[i].value)) return false;
             y[j] = fabs(value);
-            if (y[j] > largest) largest = y[j];
+            largest = maximum(y[j], largest);
         }
         return is_no_dip<pieces>(y, piece_at(i), largest);
     }
@@ -314,13 +315,16 @@ private:
         }
     }
 
+    real largest_value() const {
+        real largest = real(0);
+        for (int i = 0; i < sample_count; ++i)
+            if (is_finite(samples[i].value)) largest = maximum(fabs(samples[i].value), largest);
+        return largest;
+    }
     // Of what is not small along the step.
     bool is_zero(const Sample& sample, int e) {
         if (is_wall(e)) return fabs(sample.value) <= slack[e - first_wall];
-        real largest = real(0);
-        for (int i = 0; i < sample_count; ++i)
-            if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
-        return sample.is_exact && fabs(sample.value) <= Limits<real>::root_epsilon * largest &&
+        return sample.is_exact && fabs(sample.value) <= Limits<real>::root_epsilon * largest_value() &&
                is_rounding(sample.theta, e);
     }
     // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number, and of the
@@ -336,8 +340,7 @@ private:
         real place[n], begin[n], end[n];  // velocities
         step->polynomial(real(0), place, begin);
         step->polynomial(real(1), place, end);
-        const real few = real(64) * Limits<real>::epsilon, h = fabs(step->step_size),
-                   passed = fabs(row[0]) > h ? fabs(row[0]) : h;
+        const real few = real(64) * Limits<real>::epsilon, h = fabs(step->step_size), passed = maximum(fabs(row[0]), h);
         real change = real(0);
         for (int k = 0; k <= 2 * n; ++k) {
             real& number = k == 0 ? row[0] : k <= n ? row[k] : velocity[k - n - 1];
@@ -355,10 +358,7 @@ private:
     // Whether a change of sign between two steps, from this value to that of the first sample, is a zero: the state
     // goes on, so that both are small. At a pole, or where g jumps, they are not.
     bool is_small_at_start(real before) const {
-        real largest = real(0);
-        for (int i = 0; i < sample_count; ++i)
-            if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
-        const real here = fabs(samples[0].value), few = real(0.125) * largest;
+        const real here = fabs(samples[0].value), few = real(0.125) * largest_value();
         return here <= Limits<real>::root_epsilon * fabs(before) || (here <= few && fabs(before) <= few);
     }
 

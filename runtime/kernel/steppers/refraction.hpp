@@ -9,6 +9,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "watched_stepper.hpp"
 
 namespace lobatto {
@@ -43,10 +44,10 @@ struct Surface {
     }
     // What a rounding of the time and of positions, or of their ways in a step, does to u.
     real rounding(real time, const real* q, const real* velocity, real step) const {
-        real sum = fabs(rate) * (fabs(time) > fabs(step) ? fabs(time) : fabs(step));
+        real sum = fabs(rate) * maximum(fabs(time), fabs(step));
         for (int c = 0; c < n; ++c) {
             const real way = fabs(velocity[c] * step);
-            sum += fabs(slope[c]) * (fabs(q[c]) > way ? fabs(q[c]) : way);
+            sum += fabs(slope[c]) * maximum(fabs(q[c]), way);
         }
         return real(64) * Limits<real>::epsilon * sum;
     }

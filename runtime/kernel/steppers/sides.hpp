@@ -7,6 +7,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "refraction.hpp"
 #include "walls.hpp"
 
@@ -90,7 +91,7 @@ struct Sides {
             }
         }
         for (int i = 0; i < switches_of<K>(); ++i)
-            if (scale[i] > stepper.wall_scale[impacts_of<K>() + i]) stepper.wall_scale[impacts_of<K>() + i] = scale[i];
+            stepper.wall_scale[impacts_of<K>() + i] = maximum(scale[i], stepper.wall_scale[impacts_of<K>() + i]);
     }
     static Status start(S& stepper, real time, const real* q, const real* p) {
         take(stepper, time, q, p);

@@ -8,6 +8,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "watched_stepper.hpp"
 
 namespace lobatto {
@@ -43,7 +44,7 @@ struct Walls {
         if constexpr (impacts > 0) look_at_impacts(stepper);
         for (int w = 0; w < count; ++w) {
             real& scale = stepper.wall_scale[w];
-            if (w >= impacts && fabs(value[first + w]) > scale) scale = fabs(value[first + w]);
+            if (w >= impacts) scale = maximum(fabs(value[first + w]), scale);
             slack[w] = few * scale;
         }
         return Status::ok;
@@ -110,7 +111,7 @@ struct Walls {
         stepper.momentum(time, q, q, moved);
         for (int c = 0; c < n; ++c) {
             size += q[c] * (moved[c] - rest[c]) + h * h * velocity[c] * (p[c] - rest[c]);
-            for (const real far : {fabs(q[c]), fabs(h * velocity[c])}) farthest = far > farthest ? far : farthest;
+            farthest = maximum(fabs(h * velocity[c]), maximum(fabs(q[c]), farthest));
         }
         for (int w = 0; w < impacts; ++w) {
             const real depth = fabs(value[first + w]);
@@ -171,15 +172,15 @@ private:
     void look_at_impacts(S& stepper) {
         Formulas<K>::impact(stepper.coefficients, time, q, gradient, rate, restitution, slow);
         for (int w = 0; w < impacts; ++w) {
-            const real step = fabs(stepper.step_size), passed = fabs(time) > step ? fabs(time) : step;
+            const real step = fabs(stepper.step_size), passed = maximum(fabs(time), step);
             real sum = rate[w], speed = fabs(rate[w]), moved = speed * passed;
             for (int c = 0; c < n; ++c) {
                 const real slope = gradient[w * n + c], way = fabs(velocity[c] * stepper.step_size);
                 sum += slope * velocity[c];
                 speed += fabs(slope * velocity[c]);
-                moved += fabs(slope) * (fabs(q[c]) > way ? fabs(q[c]) : way);
+                moved += fabs(slope) * maximum(fabs(q[c]), way);
             }
-            if (moved > stepper.wall_scale[w]) stepper.wall_scale[w] = moved;
+            stepper.wall_scale[w] = maximum(moved, stepper.wall_scale[w]);
             along[w] = fabs(sum) <= few * speed ? real(0) : sum;
             approach[w] = along[w] * side(stepper, w);
         }
