@@ -135,10 +135,10 @@ constexpr bool moves_immediately() {
 // The most coordinates whose mass matrix is treated as a full one.
 constexpr int most_full = 16;
 
-// Zero when all are finite, not a number otherwise.
-template <class real>
-inline real not_finite_part(const real* x, int count) {
-    real sum = real(0);
+// Zero when all are finite, not a number otherwise; of Packs in each lane.
+template <class T>
+LOBATTO_DEVICE inline T not_finite_part(const T* x, int count) {
+    T sum = T(real_of<T>(0));
     for (int i = 0; i < count; ++i) sum += x[i] - x[i];
     return sum;
 }

@@ -296,10 +296,8 @@ struct CleanFixedPoint {
             change.value.store(a.u1 + c);
             change.rest.store(a.u1_rest + c);
         });
-        real sum = real(0);
-        for (int c = 0; c < n; ++c)
-            sum += (a.q1[c] - a.q1[c]) + (a.u1[c] - a.u1[c]) + (next[(s - 1) * n + c] - next[(s - 1) * n + c]);
-        if (!(sum == real(0))) return false;
+        if (!is_finite(not_finite_part(a.q1, n) + not_finite_part(a.u1, n) + not_finite_part(next + (s - 1) * n, n)))
+            return false;
         for (int c = 0; c < n; ++c) {
             q[c] = a.q1[c];
             q_rest[c] = a.q1_rest[c];

@@ -73,9 +73,7 @@ inline Status linear_map(typename K::Coefficients& k, typename K::real h) {
         if (!increment_of_step<K>(h, S, W0, k.Phi_minus_I)) return Status::singular_jacobian;
     }
     to_momentum<K>(k, k.Phi_minus_I);
-    real sum = real(0);
-    for (int i = 0; i < 2 * n * (2 * n + 1); ++i) sum += k.Phi_minus_I[i] - k.Phi_minus_I[i];
-    return sum == real(0) ? Status::ok : Status::not_finite;
+    return is_finite(not_finite_part(k.Phi_minus_I, 2 * n * (2 * n + 1))) ? Status::ok : Status::not_finite;
 }
 
 // (q1, p1) = (q, p) + E (q, p) + shift, E = Phi - I; E: 2n x (2n + 1), the shift its last column.
@@ -146,9 +144,7 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : ConstantMass<K> {
             propagate(columns, q1, p1);
         else
             K::propagate(coefficients, q, p, q1, p1);
-        real sum = real(0);
-        for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (p1[k] - p1[k]);
-        if (!(sum == real(0))) return Status::not_finite;
+        if (!is_finite(not_finite_part(q1, n) + not_finite_part(p1, n))) return Status::not_finite;
         for (int k = 0; k < n; ++k) {
             q[k] = q1[k];
             p[k] = p1[k];
@@ -217,10 +213,9 @@ struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
     }
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step(const Given& k, const Time&, ActiveMask active) {
-        T q1[n], p1[n], not_finite = T(real(0));
+        T q1[n], p1[n];
         K::propagate(k, q, p, q1, p1);
-        for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
-        active = active & (not_finite == T(real(0)));
+        active = active & (not_finite_part(q1, n) + not_finite_part(p1, n) == T(real(0)));
         for (int c = 0; c < n; ++c) {
             q[c] = select(active, q1[c], q[c]);
             p[c] = select(active, p1[c], p[c]);

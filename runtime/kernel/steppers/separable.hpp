@@ -283,8 +283,8 @@ private:
         stages.arrive(a.base, a.W, a.q1);
         Formulas<K>::minus_acceleration(coefficients, this->next_time(), a.q1, a.W1);
         stages.finish(a.v, a.W, a.W1, a.u1);
-        const real sum = not_finite_part(a.q1, n) + not_finite_part(a.u1, n) + not_finite_part(a.W1, n);
-        if (!(sum == real(0))) return Status::not_finite;
+        if (!is_finite(not_finite_part(a.q1, n) + not_finite_part(a.u1, n) + not_finite_part(a.W1, n)))
+            return Status::not_finite;
         for (int k = 0; k < n; ++k) {
             q_before[k] = q[k];
             u_before[k] = u[k];

@@ -325,15 +325,14 @@ struct Stepper<K, Form::separable, Stepping::composition> : VelocityKept<K> {
 
 private:
     bool move(Nothing&) {
-        real q1[n], u1[n], W1[n], sum = real(0);
+        real q1[n], u1[n], W1[n];
         for (int k = 0; k < n; ++k) {
             q1[k] = q[k];
             u1[k] = u[k];
             W1[k] = W[k];
         }
         kick_and_drift<K>(composition, coefficients, this->time(), step_size, q1, u1, W1);
-        for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (u1[k] - u1[k]);
-        if (!(sum == real(0))) return false;
+        if (!is_finite(not_finite_part(q1, n) + not_finite_part(u1, n))) return false;
         for (int k = 0; k < n; ++k) {
             q_before[k] = q[k];
             u_before[k] = u[k];
