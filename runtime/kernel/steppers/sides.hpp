@@ -59,7 +59,7 @@ struct Sides {
         for (real& size : stepper.scaled_at) size = real(0);
         if constexpr (switches_of<K>() > 0) scale_switches(stepper, time, q, p);
         Status status = wall.look(stepper, time, q, p);
-        wall.take_passages(stepper, true);
+        wall.begin_passages(stepper);
         if (status == Status::ok && wall.is_behind()) {
             wall.forgive_rounding(stepper);
             status = wall.look(stepper, time, q, p);

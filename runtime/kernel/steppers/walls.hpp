@@ -64,17 +64,13 @@ struct Walls {
         if constexpr (has_passages<K>()) return K::passage_of[w] == 2 || real(K::passage_of[w]) * from < real(0);
         return true;
     }
-    // On the side of a passage from which the motion comes, or to which it goes, where it is right there.
-    void take_passages(S& stepper, bool comes, int only = -1) {
-        for (int w = 0; w < impacts; ++w) {
-            if (!passes(w) || (only >= 0 && w != only)) continue;
-            const real here = value[first + w], after = along[w] != real(0) ? along[w] : here,
-                       sign = fabs(here) > slack[w] ? here
-                              : comes               ? -after
-                                                    : after;
-            stepper.passage_side[w] = sign < real(0) ? real(-1) : real(1);
-        }
+    // On which side of each passage the motion is; of one where it is right there, from which it comes.
+    void begin_passages(S& stepper) const {
+        for (int w = 0; w < impacts; ++w)
+            if (passes(w)) set_passage(stepper, w, -beyond(w));
     }
+    // On which side of this passage it goes on.
+    void go_beyond(S& stepper, int w) const { set_passage(stepper, w, beyond(w)); }
     bool is_behind(int w) const { return value[first + w] * real(-K::event_direction[first + w]) < -slack[w]; }
     bool is_behind() const {  // of one of the impacts
         for (int w = 0; w < impacts; ++w)
@@ -137,6 +133,12 @@ struct Walls {
     }
 
 private:
+    real beyond(int w) const { return along[w] != real(0) ? along[w] : value[first + w]; }
+    // `there`: the sign where the motion is right there.
+    void set_passage(S& stepper, int w, real there) const {
+        const real sign = fabs(value[first + w]) > slack[w] ? value[first + w] : there;
+        stepper.passage_side[w] = sign < real(0) ? real(-1) : real(1);
+    }
     // The sides of a state to which the motion has jumped; where it lies on a switch, as before. A switch may hold the
     // sides of those before it.
     void cross_switches(S& stepper, const real* position, const real* speed) {

@@ -236,7 +236,7 @@ private:
             last = lies ? first : met;
             const Status status = lies ? Status::ok : wall.hit(stepper, last);
             if (status != Status::ok) return status;
-            if (Walls<K>::passes(last)) wall.take_passages(stepper, false, last);
+            if (Walls<K>::passes(last)) wall.go_beyond(stepper, last);
             if (rows == nullptr) continue;
             real* const row = rows + count++ * columns;
             row[0] = real(first_wall + last);
