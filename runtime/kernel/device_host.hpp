@@ -244,9 +244,17 @@ private:
         if (status != Status::not_converged) return status;
         real record[1 + 2 * n];
         std::int64_t done = 0, iterations = 0;
+        lobatto_refilled_advance step{};
+        step.steps = step.capacity = 1;
+        step.tolerance = static_cast<double>(tolerance);
+        step.records = record;
+        step.events = has_events && call.watches != 0 ? events_ : nullptr;
+        step.event_capacity = Looks::most;
+        step.steps_done = &done;
+        step.iterations = &iterations;
+        step.events_written = &events;
         status = Status::ok;
-        this->advance(1, tolerance, record, 1, has_events && call.watches != 0 ? events_ : nullptr, Looks::most,
-                      &status, &done, &iterations, &events);
+        this->advance(step, &status);
         call.steps[index] += done;
         call.iterations[index] += iterations;
         return status;

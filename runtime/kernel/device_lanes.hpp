@@ -89,9 +89,9 @@ private:
     LOBATTO_INLINE static void velocities(const LaneStepper<K, T>& motion, const Given& k, const T& time, const T* p,
                                           T* v) {
         if constexpr (K::form == Form::general) {
-            decltype(T() < T()) has_momenta;
-            const bool is_converged = any(LentStep<K, T>::velocities(motion, k, time, v, &has_momenta));
-            for (int c = 0; c < n; ++c) v[c] = is_converged || any(has_momenta) ? v[c] : T(KeptNumber::none);
+            const auto known = LentStep<K, T>::velocities(motion, k, time, v);
+            for (int c = 0; c < n; ++c)
+                v[c] = any(known.have_converged | known.have_momenta) ? v[c] : T(KeptNumber::none);
         } else {
             K::velocity(k, p, v);
         }

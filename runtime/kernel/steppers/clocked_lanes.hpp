@@ -19,7 +19,7 @@ struct ClockedEnsemble : Ensemble<K, width> {
     using Base::n, Base::coefficients, Base::motion, Base::parameters, Base::coefficients_of, Base::single,
         Base::step_size, Base::steps;
     using typename Base::real, typename Base::T, typename Base::ActiveMask;
-    static constexpr int columns = 1 + 2 * n;
+    static constexpr int columns = 1 + 2 * n, events_of_step = 0;
     static constexpr std::int64_t most_steps = 4096;     // of the chain in one call
     static constexpr std::int64_t most_skipped = 65536;  // times that lanes pass arrivals without output, likewise
     // To shorten a step takes about as long as two steps, for one lane as for all. So lanes wait for each other.

@@ -19,6 +19,13 @@ namespace lobatto {
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct LentStep;
 
+// The lanes in which velocities have converged, and those in which they have the momenta, also where they are no more
+// than the rounding of these.
+template <class T>
+struct KnownVelocities {
+    decltype(T() < T()) have_converged, have_momenta;
+};
+
 // Where velocities are kept beside positions.
 template <class K, class T>
 struct LentVelocity {
@@ -31,9 +38,9 @@ struct LentVelocity {
         K::momentum(k, rates, momentum);
     }
     template <class Given>
-    LOBATTO_LANE static ActiveMask velocities(const Motion& motion, const Given&, const T&, T* velocity) {
+    LOBATTO_LANE static KnownVelocities<T> velocities(const Motion& motion, const Given&, const T&, T* velocity) {
         for (int c = 0; c < n; ++c) velocity[c] = motion.rates()[c];
-        return ActiveMask(true);
+        return {ActiveMask(true), ActiveMask(true)};
     }
     template <class Single>
     static void lend_state(const T* position, const T* velocity, Single& single, int lane) {
@@ -193,12 +200,10 @@ struct LentStep<K, T, Form::general, stepping> : LentMomentum<K, T> {
             }
         }
     }
-    // By Newton's iteration from the velocity of the last node (D27). The lanes in which it has converged.
-    // `has_momenta`: those in which the velocities have the momenta, also where they are no more than the rounding of
-    // these.
+    // By Newton's iteration from the velocity of the last node (D27).
     template <class Given>
-    LOBATTO_LANE static ActiveMask velocities(const Motion& motion, const Given& k, const T& time, T* velocity,
-                                              ActiveMask* has_momenta = nullptr) {
+    LOBATTO_LANE static KnownVelocities<T> velocities(const Motion& motion, const Given& k, const T& time,
+                                                      T* velocity) {
         static constexpr Table table{};
         T change = T(real(0)), size = T(real(0)), left = T(real(0)), whole = T(real(0));
         for (int c = 0; c < n; ++c) velocity[c] = motion.fixed_point.v[c * r + r - 1];
@@ -223,8 +228,8 @@ struct LentStep<K, T, Form::general, stepping> : LentMomentum<K, T> {
                 size += fabs(velocity[c]);
             }
         }
-        if (has_momenta != nullptr) *has_momenta = left <= T(Limits<real>::root_epsilon) * whole;
-        return change <= T(Limits<real>::root_epsilon) * size;
+        const T root = T(Limits<real>::root_epsilon);
+        return {change <= root * size, left <= root * whole};
     }
     template <class Single>
     static void lend_state(const T* position, const T* momentum, Single& single, int lane) {

@@ -71,7 +71,7 @@ struct LaneSamples {
         T q[n], velocity[n], end[K::events];
         const T next = begun + (gone + T(real(1))) * T(h);
         for (int c = 0; c < n; ++c) q[c] = motion.position(c);
-        ActiveMask quiet = Step::velocities(motion, k, next, velocity);
+        ActiveMask quiet = Step::velocities(motion, k, next, velocity).have_converged;
         Formulas<K>::event(k, next, q, velocity, end);
         for (int e = 0; e < K::events; ++e) quiet = quiet & is_quiet(e, y, end[e]);
         return !quiet;
@@ -162,6 +162,7 @@ struct RefilledEnsemble : Ensemble<K, width> {
     static constexpr int columns = 1 + 2 * n;
     static constexpr bool has_events = K::events > 0;
     using Looks = std::conditional_t<has_events, LaneWatch<K, width>, NoLaneWatch<K, width>>;
+    static constexpr int events_of_step = Looks::most;
 
     T begun, gone;  // the time at which each lane began, and its steps since then
     Looks looks;
@@ -186,28 +187,29 @@ struct RefilledEnsemble : Ensemble<K, width> {
         return status;
     }
 
-    // At most `count` steps of the lanes whose status is ok, until one of them ends. After each step a row of t, q, p
-    // of each, `capacity` rows a lane; events as of Watch, where there is room for them.
-    void advance(std::int64_t count, real tolerance, real* records, std::int64_t capacity, real* events,
-                 std::int64_t event_capacity, Status* status, std::int64_t* done, std::int64_t* iterations,
-                 std::int64_t* events_written) {
+    // At most call.steps of the lanes whose status is ok, until one of them ends. After each step a row of t, q, p of
+    // each, call.capacity rows a lane; events as of Watch, where there is room for them.
+    template <class Call>
+    void advance(const Call& call, Status* status) {
+        const real tolerance = static_cast<real>(call.tolerance);
+        real* const events = static_cast<real*>(call.events);
         motion.set_tolerance(tolerance);
         single.tolerance = tolerance;
         ActiveMask active = ActiveMask(false);
         for (int lane = 0; lane < width; ++lane) {
             active.set(lane, status[lane] == Status::ok);
-            done[lane] = events_written[lane] = 0;
+            call.steps_done[lane] = call.events_written[lane] = 0;
         }
         T evaluations = T(real(0));
         std::int64_t taken = 0;
         bool has_left = false;
         const auto leave = [&](int lane, Status why) {
             status[lane] = why;
-            done[lane] = taken;
+            call.steps_done[lane] = taken;
             active.set(lane, false);
             has_left = true;
         };
-        while (taken < count && taken < capacity && !has_left && any(active)) {
+        while (taken < call.steps && taken < call.capacity && !has_left && any(active)) {
             T q_before[n], rate_before[n];
             for (int c = 0; c < n; ++c) {
                 q_before[c] = motion.position(c);
@@ -229,21 +231,22 @@ struct RefilledEnsemble : Ensemble<K, width> {
                         if (!restless[lane]) continue;
                         const Status found =
                             look(lane, q_before, rate_before, tolerance,
-                                 events + lane * event_capacity * Looks::columns, events_written[lane]);
+                                 events + lane * call.event_capacity * Looks::columns, call.events_written[lane]);
                         if (found != Status::ok) leave(lane, found);
                     }
                 }
             }
             gone = select(active, gone + T(real(1)), gone);
-            record(next, records + taken * columns, capacity * columns);
+            record(next, static_cast<real*>(call.records) + taken * columns, call.capacity * columns);
             ++taken;
             for (int lane = 0; lane < width; ++lane)
-                has_left = has_left || (events != nullptr && events_written[lane] + Looks::most > event_capacity);
+                has_left =
+                    has_left || (events != nullptr && call.events_written[lane] + Looks::most > call.event_capacity);
         }
         looks.rest();
         for (int lane = 0; lane < width; ++lane) {
-            if (status[lane] == Status::ok) done[lane] = taken;
-            iterations[lane] = static_cast<std::int64_t>(evaluations[lane]);
+            if (status[lane] == Status::ok) call.steps_done[lane] = taken;
+            call.iterations[lane] = static_cast<std::int64_t>(evaluations[lane]);
         }
     }
 
