@@ -303,7 +303,21 @@ private:
 #endif
 
 template <class K, bool has_lanes = has_device_lanes<K>()>
-struct ExportDeviceLanes {
+struct ExportDeviceLanes;
+// None, and the functions are null.
+template <class K>
+struct ExportDeviceLanes<K, false> {
+    static constexpr lobatto_device_lanes empty_table() {
+        lobatto_device_lanes t{};
+        t.abi_version = LOBATTO_ABI_VERSION;
+        t.bytes = sizeof(lobatto_device_lanes);
+        t.digest = K::digest;
+        return t;
+    }
+    static constexpr lobatto_device_lanes table = empty_table();
+};
+template <class K>
+struct ExportDeviceLanes<K, true> {
     using real = typename K::real;
     using Host = HostLane<K>;
     using Shared = SharedByLanes<K>;
@@ -372,45 +386,26 @@ struct ExportDeviceLanes {
             lane.state(*call, l, out(q) + l * n, out(p) + l * n, out(energy) + l, out(kept) + l * KeptFormulas::parts);
     }
 
-    static constexpr lobatto_device_lanes table = {LOBATTO_ABI_VERSION,
-                                                   sizeof(lobatto_device_lanes),
-                                                   K::digest,
-                                                   device_words<K>,
-                                                   MovingWords<K>::first,
-                                                   MovingWords<K>::count,
-                                                   sizeof(Shared),
-                                                   alignof(Shared),
-                                                   sizeof(Host),
-                                                   alignof(Host),
-                                                   Host::columns,
-                                                   KeptFormulas::parts,
-                                                   place,
-                                                   shared,
-                                                   own,
-                                                   advance,
-                                                   retake,
-                                                   state};
-};
-template <class K>
-struct ExportDeviceLanes<K, false> {
-    static constexpr lobatto_device_lanes table = {LOBATTO_ABI_VERSION,
-                                                   sizeof(lobatto_device_lanes),
-                                                   K::digest,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   nullptr,
-                                                   nullptr,
-                                                   nullptr,
-                                                   nullptr,
-                                                   nullptr,
-                                                   nullptr};
+    static constexpr lobatto_device_lanes filled_table() {
+        lobatto_device_lanes t = ExportDeviceLanes<K, false>::table;
+        t.words = device_words<K>;
+        t.first_moving = MovingWords<K>::first;
+        t.moving = MovingWords<K>::count;
+        t.shared_bytes = sizeof(Shared);
+        t.shared_alignment = alignof(Shared);
+        t.host_bytes = sizeof(Host);
+        t.host_alignment = alignof(Host);
+        t.columns = Host::columns;
+        t.kept = KeptFormulas::parts;
+        t.place = place;
+        t.shared = shared;
+        t.own = own;
+        t.advance = advance;
+        t.retake = retake;
+        t.state = state;
+        return t;
+    }
+    static constexpr lobatto_device_lanes table = filled_table();
 };
 
 }  // namespace lobatto

@@ -263,66 +263,71 @@ struct Export {
             return E::events_of_step;
     }
 
-    static constexpr lobatto_kernel table = {LOBATTO_ABI_VERSION,
-                                             sizeof(lobatto_kernel),
-                                             K::name,
-                                             K::digest,
-                                             K::method,
-                                             kind(),
-                                             sizeof(real),
-                                             parts,
-                                             static_cast<double>(Limits<real>::epsilon),
-                                             static_cast<std::int32_t>(K::form),
-                                             n,
-                                             K::parameter_count,
-                                             inputs,
-                                             first_input(),
-                                             S::nodes,
-                                             K::order,
-                                             S::N,
-                                             K::autonomous ? 1 : 0,
-                                             is_clocked<K> ? 1 : 0,
-                                             K::linear ? 1 : 0,
-                                             constraint_count,
-                                             K::has_energy ? 1 : 0,
-                                             has_tangent ? 1 : 0,
-                                             has_dense ? 1 : 0,
-                                             event_count,
-                                             is_whole ? stops_of<K>() : 0,
-                                             is_whole ? impacts_of<K>() : 0,
-                                             events_of_step(),
-                                             sizeof(S),
-                                             alignof(S),
-                                             prepare,
-                                             start,
-                                             go_on,
-                                             advance,
-                                             state,
-                                             inputs_taken,
-                                             two_fold_state,
-                                             dense,
-                                             to_parts,
-                                             from_parts,
-                                             energy,
-                                             momentum,
-                                             velocity,
-                                             slopes,
-                                             constraint,
-                                             find_multipliers,
-                                             residual,
-                                             jacobian,
-                                             tangent,
-                                             E::lanes,
-                                             E::bytes,
-                                             E::alignment,
-                                             E::prepare,
-                                             E::start,
-                                             E::advance,
-                                             E::state,
-                                             K::has_energy ? E::energy : nullptr,
-                                             E::refilled_prepare,
-                                             E::fill,
-                                             E::refilled_advance};
+    static constexpr lobatto_kernel filled_table() {
+        lobatto_kernel t{};
+        t.abi_version = LOBATTO_ABI_VERSION;
+        t.bytes = sizeof(lobatto_kernel);
+        t.name = K::name;
+        t.digest = K::digest;
+        t.method = K::method;
+        t.real_kind = kind();
+        t.real_bytes = sizeof(real);
+        t.parts = parts;
+        t.epsilon = static_cast<double>(Limits<real>::epsilon);
+        t.form = static_cast<std::int32_t>(K::form);
+        t.coordinates = n;
+        t.parameters = K::parameter_count;
+        t.inputs = inputs;
+        t.first_input = first_input();
+        t.nodes = S::nodes;
+        t.order = K::order;
+        t.unknowns = S::N;
+        t.autonomous = K::autonomous;
+        t.clocked = is_clocked<K>;
+        t.linear = K::linear;
+        t.constraints = constraint_count;
+        t.has_energy = K::has_energy;
+        t.has_tangent = has_tangent;
+        t.has_dense = has_dense;
+        t.events = event_count;
+        t.stops = is_whole ? stops_of<K>() : 0;
+        t.impacts = is_whole ? impacts_of<K>() : 0;
+        t.events_of_step = events_of_step();
+        t.stepper_bytes = sizeof(S);
+        t.stepper_alignment = alignof(S);
+        t.prepare = prepare;
+        t.start = start;
+        t.go_on = go_on;
+        t.advance = advance;
+        t.state = state;
+        t.set_inputs = inputs_taken;
+        t.two_fold_state = two_fold_state;
+        t.dense = dense;
+        t.to_parts = to_parts;
+        t.from_parts = from_parts;
+        t.energy = energy;
+        t.momentum = momentum;
+        t.velocity = velocity;
+        t.slopes = slopes;
+        t.constraint = constraint;
+        t.multipliers = find_multipliers;
+        t.residual = residual;
+        t.jacobian = jacobian;
+        t.tangent = tangent;
+        t.lanes = E::lanes;
+        t.ensemble_bytes = E::bytes;
+        t.ensemble_alignment = E::alignment;
+        t.ensemble_prepare = E::prepare;
+        t.ensemble_start = E::start;
+        t.ensemble_advance = E::advance;
+        t.ensemble_state = E::state;
+        t.ensemble_energy = K::has_energy ? E::energy : nullptr;
+        t.refilled_prepare = E::refilled_prepare;
+        t.refilled_fill = E::fill;
+        t.refilled_advance = E::refilled_advance;
+        return t;
+    }
+    static constexpr lobatto_kernel table = filled_table();
 };
 
 // With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster, and where
