@@ -144,7 +144,12 @@ concept GeneralKernel = KernelOfAnyForm<K> && K::form == Form::general&& OrderOf
     { K::constraint_entries } -> std::convertible_to<int>;
     K::constraint_row[0];
     K::constraint_column[0];
-};
+}
+&&(!K::any_number || requires {
+    K::integration[K::nodes * K::nodes - 1];
+    K::reach[(K::controls - 1) * K::nodes - 1];
+    K::ahead[K::nodes * K::nodes - 1];
+});
 
 template <class K>
 concept Kernel = LinearMapKernel<K> || SeparableKernel<K> || GeneralKernel<K>;
