@@ -34,7 +34,7 @@ struct KeptFormulas {  // nothing is kept
 
 #ifdef LOBATTO_DEVICE_WATCHES
 template <class K>
-constexpr bool has_watched_lanes = impacts_of<K>() == 0 && switches_of<K>() == 0;
+constexpr bool has_watched_lanes = K::impacts == 0 && K::switches == 0;
 
 // What is kept of a lane's trajectory so far. Formulas are in double.
 template <class K>
@@ -142,10 +142,8 @@ constexpr bool has_device_lanes() {
 #ifdef LOBATTO_DEVICE_WATCHES
     if (!has_watched_lanes<K>) return false;
 #endif
-    if constexpr (ensemble_lanes<K>(1) == 0)
+    if constexpr (ensemble_lanes<K>(1) == 0 || K::neighbours)
         return false;
-    else if constexpr (K::form == Form::separable)
-        return !K::neighbours && sizeof(DeviceLane<K>) <= most;
     else
         return sizeof(DeviceLane<K>) <= most;
 }

@@ -41,7 +41,6 @@
 #include "iteration/stage_equations.hpp"
 #include "iteration/stage_map.hpp"
 #include "iteration/tangent.hpp"
-#include "iteration/time_coordinate.hpp"
 #include "iteration/velocity_of_momentum.hpp"
 #include "steppers/clean.hpp"
 #include "steppers/clocked.hpp"

@@ -2,7 +2,7 @@
 // What an emitted kernel K provides: static functions, the formulas of one scene, and constants (concept.hpp checks).
 //
 // Every kernel: real; name, digest, method; coordinates (n), order, parameter_count, Parameters, parameter();
-// Coefficients, prepare(); form; and these claims, all constexpr:
+// Coefficients, prepare(); form; and claims, all constexpr, of which KernelDefaults has those that rarely hold:
 //   autonomous   no formula depends on time; otherwise `real time` follows `k` in every function that takes `k` and q
 //   linear       the second derivatives are constant, so that one correction solves a step
 //   has_energy, has_tangent   whether energies and tangent maps are compiled
@@ -56,6 +56,18 @@ enum class Status : std::int32_t {
 // The same values as lobatto_form in abi.h.
 enum class Form : std::int32_t { linear_map = 0, separable = 1, general = 2 };
 
+// What a kernel claims by saying nothing: kernels inherit this, and declare what is otherwise.
+struct KernelDefaults {
+    static constexpr bool linear = false, clean = false, is_explicit = false, absorbed = false, diagonal_part = false;
+    static constexpr bool neighbours = false, immediate = false, unit_masses = false;
+    static constexpr bool clocked = false, has_time_coordinate = false, hamiltonian = false;
+    static constexpr bool constant_mass = false, scaled_mass = false, mass_needs_velocity = false;
+    static constexpr int events = 0, event_direction[1] = {}, stops = 0, impacts = 0, resets = 0, passages = 0;
+    static constexpr int switches = 0, refractions = 0, inputs = 0, first_input = 0, angles = 0, row_reach = -1;
+    static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {}, constraint_column[1] = {};
+    static constexpr int momentum_summand_count = 0;
+};
+
 // K's functions with a time for all of them: it is passed on where the kernel depends on it.
 #define LOBATTO_WITH_TIME(name)                                                                 \
     template <class Given, class Time, class... Rest>                                           \
@@ -102,34 +114,10 @@ struct Formulas {
 enum class Stepping { solved, clean, composition, clocked };
 template <class K>
 constexpr Stepping stepping_of() {
-    if constexpr (K::form == Form::separable)
-        return K::clean ? Stepping::clean : K::is_explicit ? Stepping::composition : Stepping::solved;
-    else if constexpr (K::form == Form::general)
-        return K::clocked ? Stepping::clocked : Stepping::solved;
-    else
-        return Stepping::solved;
-}
-template <class K>
-constexpr bool is_clean = stepping_of<K>() == Stepping::clean;
-template <class K>
-constexpr bool is_clocked = stepping_of<K>() == Stepping::clocked;
-
-// Systems with constant mass have none: what pulls on coordinates is of the general form.
-template <class K>
-constexpr int constraints_of() {
-    if constexpr (K::form == Form::general)
-        return K::constraints;
-    else
-        return 0;
-}
-
-// Whether a coordinate may move as soon as its acceleration is known.
-template <class K>
-constexpr bool moves_immediately() {
-    if constexpr (K::neighbours && stepping_of<K>() == Stepping::composition)
-        return K::immediate;
-    else
-        return false;
+    return K::clocked                                     ? Stepping::clocked
+           : K::clean                                     ? Stepping::clean
+           : K::form == Form::separable && K::is_explicit ? Stepping::composition
+                                                          : Stepping::solved;
 }
 
 // The most coordinates whose mass matrix is treated as a full one.

@@ -93,7 +93,7 @@ struct Advance {
 
     template <class AnyWatch>
     static Status take_steps(S& stepper, lobatto_advance& call, AnyWatch* watch) {
-        if constexpr (is_clocked<K>) {
+        if constexpr (K::clocked) {
             const Status status = take_intervals(stepper, call, watch);
             if (call.chain != nullptr) put_state(stepper.now.time, stepper.q, stepper.p, out(call.chain));
             return status;

@@ -81,8 +81,7 @@ struct ExportLanes : NoEnsemble {
 };
 
 template <class K, int width>
-using ExportSide =
-    std::conditional_t<is_clocked<K>, ExportLanes<K, ClockedEnsemble<K, width>>, ExportEnsemble<K, width>>;
+using ExportSide = std::conditional_t<K::clocked, ExportLanes<K, ClockedEnsemble<K, width>>, ExportEnsemble<K, width>>;
 #ifdef LOBATTO_REFILLED
 template <class K, int width>
 using ExportRefilled = ExportLanes<K, RefilledEnsemble<K, width>>;

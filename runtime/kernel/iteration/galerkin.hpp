@@ -23,7 +23,6 @@
 #include "galerkin_tables.hpp"
 #include "hamilton.hpp"
 #include "node_mass.hpp"
-#include "time_coordinate.hpp"
 
 #ifdef __clang__  // which warns of loops that are too large to unroll, in mechanisms
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -348,8 +347,8 @@ private:
         if constexpr (K::clocked) {
             V rate[parts];
             for (int part = 0; part < parts; ++part)
-                rate[part] = HasTimeCoordinate<K>::value ? a.v[part * n + n - 1]
-                                                         : Formulas<K>::clock(k, V(time), a.Q + part * n);
+                rate[part] =
+                    K::has_time_coordinate ? a.v[part * n + n - 1] : Formulas<K>::clock(k, V(time), a.Q + part * n);
             const T passed = over_nodes(weight, rate, 1);
             not_finite += passed - passed;
             elapsed = select(done, passed, elapsed);

@@ -60,7 +60,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
     using Chain = Stepper<K, Form::general, Stepping::solved>;
     using Chain::n, Chain::q, Chain::p, Chain::q_before, Chain::coefficients, Chain::step_size, Chain::elapsed;
     using typename Chain::real;
-    static constexpr bool has_time_coordinate = HasTimeCoordinate<K>::value;
+    static constexpr bool has_time_coordinate = K::has_time_coordinate;
     static constexpr int moving = has_time_coordinate ? n - 1 : n;
 
     typename K::Parameters values{};                      // the last one is E of (D42), or sigma of (D64)

@@ -147,18 +147,18 @@ private:
         Status done = partial->prepare(step->parameters, length);
         partial->tolerance = step->tolerance;
         if (done == Status::ok) {
-            if constexpr (is_clocked<K>)
+            if constexpr (K::clocked)
                 done = partial->start(time, q, p, step->known_of_start());
             else
                 done = partial->start(time, q, p);
         }
         if (done == Status::ok) done = partial->step();
-        if (is_clocked<K> && done == Status::time_stands_still) return;  // so short that it ends where it begins
+        if (K::clocked && done == Status::time_stands_still) return;  // so short that it ends where it begins
         if (done != Status::ok) {
             status = done;
             return;
         }
-        if constexpr (is_clocked<K>) row[0] = partial->time();
+        if constexpr (K::clocked) row[0] = partial->time();
         for (int k = 0; k < n; ++k) row[1 + k] = partial->q[k];
         partial->momentum(momentum);
     }

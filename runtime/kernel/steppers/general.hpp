@@ -149,7 +149,7 @@ struct Stepper<K, Form::general, Stepping::solved> : ConstraintChecks<K> {
             const Status status = velocity(time, position, momentum, v);
             if (status != Status::ok) return status;
             *value = Formulas<K>::energy(coefficients, time, position, v);
-            if constexpr (MassNeedsVelocity<K>::value) {
+            if constexpr (K::mass_needs_velocity) {
                 // H errs by dH/dv = M v times the error of v, and by its square with the momentum that is known (D26).
                 real Lv[n], Lq[n];
                 slopes(time, position, v, Lv, Lq);
@@ -330,8 +330,7 @@ private:
             for (int i = 0; i < r; ++i) {
                 this->node_variables(q, p, a.Y, i, a.z);
                 for (int b = 0; b < active; ++b) Q[K::active_index[b]] = a.z[active + b];
-                rates[i] =
-                    HasTimeCoordinate<K>::value ? a.z[active - 1] : Formulas<K>::clock(coefficients, this->time(), Q);
+                rates[i] = K::has_time_coordinate ? a.z[active - 1] : Formulas<K>::clock(coefficients, this->time(), Q);
                 passed += K::b[i] * rates[i];
             }
         }

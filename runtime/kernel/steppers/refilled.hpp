@@ -94,7 +94,7 @@ private:
             const ActiveMask is_least = quiet & (y[i] <= y[i - 1]) & (y[i] < y[i + 1]);
             if (!any(is_least)) continue;
             if constexpr (pieces >= 4)
-                quiet = quiet & (!is_least | is_no_dip<pieces>(at, Sampled::piece_at(i), largest));
+                quiet = quiet & (is_no_dip<pieces>(at, Sampled::piece_at(i), largest) | !is_least);
             else
                 quiet = quiet & !is_least;
         }

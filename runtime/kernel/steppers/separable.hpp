@@ -18,15 +18,6 @@
 
 namespace lobatto {
 
-// Whether iterations have neighbouring coordinates in lanes, not nodes.
-template <class K>
-constexpr bool along_coordinates() {
-    if constexpr (K::any_number && !K::linear)
-        return K::neighbours;
-    else
-        return false;
-}
-
 template <class K>
 struct Stepper<K, Form::separable, Stepping::solved> : VelocityKept<K> {
     using typename VelocityKept<K>::real;
@@ -39,7 +30,7 @@ struct Stepper<K, Form::separable, Stepping::solved> : VelocityKept<K> {
     using Stages = StageEquations<K>;
     using Newton = NewtonIteration<K>;
     static constexpr bool has_fixed_point = N > 0 && K::any_number && !K::linear && !K::clean;
-    static constexpr bool along_coordinates = has_fixed_point && lobatto::along_coordinates<K>();
+    static constexpr bool along_coordinates = has_fixed_point && K::neighbours;  // in lanes, not nodes
 
     struct Arrays : Newton::Arrays {
         real q1[n], u1[n], W1[n];  // the end of the step

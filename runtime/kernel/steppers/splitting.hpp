@@ -191,15 +191,6 @@ private:
     }
 };
 
-template <class K, bool along_neighbours>
-struct NeighbourCompositionOf {
-    using type = NeighbourComposition<K>;
-};
-template <class K>
-struct NeighbourCompositionOf<K, false> {
-    using type = Nothing;
-};
-
 template <class K>
 struct Stepper<K, Form::separable, Stepping::composition> : VelocityKept<K> {
     using typename VelocityKept<K>::real;
@@ -220,7 +211,7 @@ struct Stepper<K, Form::separable, Stepping::composition> : VelocityKept<K> {
     real q_before[n]{}, u_before[n]{};  // before the last step; likewise
     bool has_history{};                 // what lies between the ends of the last step is known
     mutable Ends ends{};
-    typename NeighbourCompositionOf<K, K::neighbours>::type neighbours{};
+    std::conditional_t<K::neighbours, NeighbourComposition<K>, Nothing> neighbours{};
 
     Status prepare(const typename K::Parameters& parameters, real h) {
         step_size = h;
@@ -410,7 +401,7 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
     LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const int next = 1 - now;
         T not_finite = T(real(0));
-        if constexpr (moves_immediately<K>()) {
+        if constexpr (K::immediate) {
             immediate_step<K>(composition, k, time, q[now], u[now], W[now], q[next], u[next], W[next]);
             for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
         } else {

@@ -56,12 +56,12 @@ struct Walls {
         return w < impacts ? real(-K::event_direction[first + w]) : stepper.side(w - impacts);
     }
     static bool passes(int w) {
-        if constexpr (has_passages<K>()) return w < impacts && K::passage_of[w] != 0;
+        if constexpr (K::passages > 0) return w < impacts && K::passage_of[w] != 0;
         return false;
     }
     // Whether a crossing that leads away from this side gives the motion a new state.
     static bool acts(int w, real from) {
-        if constexpr (has_passages<K>()) return K::passage_of[w] == 2 || real(K::passage_of[w]) * from < real(0);
+        if constexpr (K::passages > 0) return K::passage_of[w] == 2 || real(K::passage_of[w]) * from < real(0);
         return true;
     }
     // On which side of each passage the motion is; of one where it is right there, from which it comes.
@@ -88,7 +88,7 @@ struct Walls {
         if (status != Status::ok) return status;
         const real impulse = -(real(1) + restitution[w]) * approach[w] * side(stepper, w) / mobility;
         if (!is_finite(impulse)) return Status::not_finite;
-        if constexpr (constraints_of<K>() > 0) {
+        if constexpr (K::constraints > 0) {
             for (int c = 0; c < n; ++c) velocity[c] += impulse * change[c];
             stepper.momentum(time, q, velocity, p);
         } else {
@@ -142,10 +142,10 @@ private:
     // The sides of a state to which the motion has jumped; where it lies on a switch, as before. A switch may hold the
     // sides of those before it.
     void cross_switches(S& stepper, const real* position, const real* speed) {
-        for (int tries = 0; tries < switches_of<K>(); ++tries) {
+        for (int tries = 0; tries < K::switches; ++tries) {
             bool crosses = false;
             Formulas<K>::event(stepper.coefficients, time, position, speed, value);
-            for (int i = 0; i < switches_of<K>(); ++i) {
+            for (int i = 0; i < K::switches; ++i) {
                 const real there = value[first + impacts + i] * stepper.side(i);
                 if (!(there < -slack[impacts + i])) continue;
                 stepper.side(i) = -stepper.side(i);

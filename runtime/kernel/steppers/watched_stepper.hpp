@@ -23,7 +23,7 @@ struct Between {
     static constexpr int n = K::coordinates, columns = 1 + 2 * n;
 
     static real time(const S& stepper, real theta) {
-        if constexpr (is_clocked<K>)
+        if constexpr (K::clocked)
             return stepper.time_within(theta);
         else
             return stepper.start_time + (real(stepper.steps - 1) + theta) * stepper.step_size;
@@ -41,43 +41,12 @@ struct Between {
     }
 };
 
-// The functions at the end of those that are watched: of walls, and before them of stops.
-template <class K>
-constexpr int impacts_of() {
-    if constexpr (K::events > 0)
-        return K::impacts;
-    else
-        return 0;
-}
-template <class K>
-constexpr bool has_passages() {
-    if constexpr (impacts_of<K>() > 0)
-        return K::passages > 0;
-    else
-        return false;
-}
-template <class K>
-constexpr int stops_of() {
-    if constexpr (K::events > 0)
-        return K::stops;
-    else
-        return 0;
-}
-
-template <class K>
-constexpr int switches_of() {
-    if constexpr (K::events > 0)
-        return K::switches;
-    else
-        return 0;
-}
-
 // A stepper that knows its parameters, for steps of other lengths.
 template <class K>
 struct WatchedStepper : Stepper<K> {
     using real = typename K::real;
     typename K::Parameters parameters{};
-    static constexpr int walls = impacts_of<K>() + switches_of<K>(), wall_room = walls > 0 ? walls : 1;
+    static constexpr int walls = K::impacts + K::switches, wall_room = walls > 0 ? walls : 1;
     real wall_scale[wall_room]{};              // the most that went into each wall's function so far
     real scaled_at[1 + 2 * K::coordinates]{};  // the time, positions and velocities, as large, that this is known of
     real passage_side[wall_room]{};            // of walls that let the motion pass: the sign of g where it is
@@ -94,7 +63,7 @@ struct WatchedStepper : Stepper<K> {
     }
 
     // The side of a switch: 1 or -1.
-    real& side(int number) { return K::parameter(parameters, K::parameter_count - switches_of<K>() + number); }
+    real& side(int number) { return K::parameter(parameters, K::parameter_count - K::switches + number); }
 };
 
 // What was last known of the events of a motion that goes on in another stepper, or in this one after a restart.
