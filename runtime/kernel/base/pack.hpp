@@ -330,6 +330,14 @@ LOBATTO_INLINE auto fused_sum(const A& a, const B& b, const C& c) {
     return fused(a, b, c);
 }
 
+// a + b = sum + error, for any sizes of a and b (D. E. Knuth).
+template <class T>
+LOBATTO_INLINE constexpr T add_with_error(const T& a, const T& b, T& error) {
+    const T sum = a + b, of_b = sum - a;
+    error = (a - (sum - of_b)) + (b - of_b);
+    return sum;
+}
+
 // How many lanes a type has, and of which number.
 template <class T>
 constexpr int lanes_of = 1;

@@ -30,14 +30,6 @@
 
 namespace lobatto {
 
-// a + b = sum + error, for any sizes of a and b.
-template <class V>
-LOBATTO_INLINE V add_with_error(const V& a, const V& b, V& error) {
-    const V sum = a + b, of_b = sum - a;
-    error = (a - (sum - of_b)) + (b - of_b);
-    return sum;
-}
-
 template <class real>
 constexpr bool has_64_bits = std::is_same_v<real, long double>&& std::numeric_limits<real>::digits == 64;
 

@@ -33,13 +33,12 @@ inline void round_to_unit_determinant(real* E) {
             for (const real c : candidates[2])
                 for (const real d : candidates[3]) {
                     const real ad = a * d, bc = b * c;
-                    // tr E + det E, the terms and their rounding, summed without loss (TwoSum).
+                    // tr E + det E, the terms and their rounding, summed without loss.
                     const real terms[6] = {a, d, ad, -bc, rounded_once(a, d, -ad), -rounded_once(b, c, -bc)};
-                    real sum = real(0), lost = real(0);
+                    real sum = real(0), lost = real(0), error;
                     for (const real term : terms) {
-                        const real next = sum + term, back = next - sum;
-                        lost += (sum - (next - back)) + (term - back);
-                        sum = next;
+                        sum = add_with_error(sum, term, error);
+                        lost += error;
                     }
                     const real defect = fabs(sum + lost);
                     if (defect < least) {

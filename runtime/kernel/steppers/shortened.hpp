@@ -16,12 +16,7 @@ template <class T>
 struct LongTime {
     T time{}, rest{};
 
-    void add(const T& part) {
-        const T wanted = part + rest, sum = time + wanted;
-        const T added = sum - time;
-        rest = (time - (sum - added)) + (wanted - added);
-        time = sum;
-    }
+    void add(const T& part) { time = add_with_error(time, part + rest, rest); }
     // What is missing to `target`.
     T until(const T& target) const { return (target - time) - rest; }
 };
