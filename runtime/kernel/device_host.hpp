@@ -286,11 +286,7 @@ private:
     void remember(const T* q, const T* rates, real* row) const {
         T momentum[n];
         Step::momenta(rates, coefficients, momentum);
-        row[0] = lane_of(this->begun + this->gone * T(this->step_size), 0);
-        for (int c = 0; c < n; ++c) {
-            row[1 + c] = lane_of(q[c], 0);
-            row[1 + n + c] = lane_of(momentum[c], 0);
-        }
+        put_state<n>(lane_of(this->begun + this->gone * T(this->step_size), 0), q, momentum, row);
     }
     void fill(DeviceLane<K>& row) const {
         row.coefficients = coefficients;

@@ -131,6 +131,16 @@ LOBATTO_DEVICE inline T not_finite_part(const T* x, int count) {
     return sum;
 }
 
+// A row of t, q[n], p[n]; of Packs, that of one lane.
+template <int n, class real, class Number>
+inline void put_state(real time, const Number* q, const Number* p, real* row, int lane = 0) {
+    row[0] = time;
+    for (int c = 0; c < n; ++c) {
+        row[1 + c] = lane_of(q[c], lane);
+        row[1 + n + c] = lane_of(p[c], lane);
+    }
+}
+
 // What the steppers of all forms carry.
 template <class K>
 struct Motion {

@@ -81,21 +81,14 @@ struct Advance {
         return stops_beyond ? Status::ok : status;
     }
     static void put_row(real time, const real* q, const real* p, lobatto_advance& call) {
-        put_state(time, q, p, next_row(call));
-    }
-    static void put_state(real time, const real* q, const real* p, real* row) {
-        row[0] = time;
-        for (int k = 0; k < n; ++k) {
-            row[1 + k] = q[k];
-            row[1 + n + k] = p[k];
-        }
+        put_state<n>(time, q, p, next_row(call));
     }
 
     template <class AnyWatch>
     static Status take_steps(S& stepper, lobatto_advance& call, AnyWatch* watch) {
         if constexpr (K::clocked) {
             const Status status = take_intervals(stepper, call, watch);
-            if (call.chain != nullptr) put_state(stepper.now.time, stepper.q, stepper.p, out(call.chain));
+            if (call.chain != nullptr) put_state<n>(stepper.now.time, stepper.q, stepper.p, out(call.chain));
             return status;
         } else {
             return take_equal_steps(stepper, call, watch);
@@ -134,10 +127,9 @@ struct Advance {
                     for (std::int32_t d = 1; d <= call.dense; ++d)
                         Between<K>::row(stepper, real(d) / real(call.dense + 1), next_row(call));
                 }
-                real* const row = next_row(call);
-                row[0] = stepper.time();
-                for (int k = 0; k < n; ++k) row[1 + k] = stepper.q[k];
-                stepper.momentum(row + 1 + n);
+                real p[n];
+                stepper.momentum(p);
+                put_row(stepper.time(), stepper.q, p, call);
                 until_record = call.record_every;
             }
         }

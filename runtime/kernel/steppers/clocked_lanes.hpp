@@ -248,11 +248,7 @@ private:
     void put_row(const Call& call, int lane, std::int64_t arrival, const Number* q, const Number* p) {
         real* const row =
             static_cast<real*>(call.records) + (lane * call.capacity + call.records_written[lane]++) * columns;
-        row[0] = time_of(lane, arrival);
-        for (int c = 0; c < n; ++c) {
-            row[1 + c] = lane_of(q[c], lane);
-            row[1 + n + c] = lane_of(p[c], lane);
-        }
+        put_state<n>(time_of(lane, arrival), q, p, row, lane);
     }
 };
 

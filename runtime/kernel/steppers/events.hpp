@@ -131,17 +131,13 @@ private:
 
     // t, q, p at t + theta h, by a step of that length.
     LOBATTO_APART void state_at(real theta, real* row) {
-        row[0] = Between<K>::time(*step, theta);
-        real* const momentum = row + 1 + n;
+        real momentum[n];
+        const real there = Between<K>::time(*step, theta);
         if (theta == real(1)) {
-            for (int k = 0; k < n; ++k) row[1 + k] = step->q[k];
             step->momentum(momentum);
-            return;
+            return put_state<n>(there, step->q, momentum, row);
         }
-        for (int k = 0; k < n; ++k) {
-            row[1 + k] = q[k];
-            momentum[k] = p[k];
-        }
+        put_state<n>(there, q, p, row);
         const real length = theta * step->step_size;
         if (time + length == time) return;
         Status done = partial->prepare(step->parameters, length);
@@ -158,9 +154,8 @@ private:
             status = done;
             return;
         }
-        if constexpr (K::clocked) row[0] = partial->time();
-        for (int k = 0; k < n; ++k) row[1 + k] = partial->q[k];
         partial->momentum(momentum);
+        put_state<n>(K::clocked ? partial->time() : there, partial->q, momentum, row);
     }
     LOBATTO_APART real exactly(real theta, int e) {
         real values[K::events];

@@ -171,11 +171,7 @@ private:
                     continue;
                 stop = s;
                 count = rows;
-                row[0] = wall.time;
-                for (int c = 0; c < n; ++c) {
-                    row[1 + c] = wall.q[c];
-                    row[1 + n + c] = wall.p[c];
-                }
+                put_state<n>(wall.time, wall.q, wall.p, row);
             }
         }
     };
@@ -240,11 +236,7 @@ private:
             if (rows == nullptr) continue;
             real* const row = rows + count++ * columns;
             row[0] = real(first_wall + last);
-            row[1] = wall.time;
-            for (int k = 0; k < n; ++k) {
-                row[2 + k] = wall.q[k];
-                row[2 + n + k] = wall.p[k];
-            }
+            put_state<n>(wall.time, wall.q, wall.p, row + 1);
             if (lies) return Status::stopped;
         }
     }
