@@ -129,7 +129,7 @@ template <class K>
 class HostLane<K, true> : LaneOnHost<K, RefilledEnsemble<K, 1> > {
     using Base = LaneOnHost<K, RefilledEnsemble<K, 1> >;
     using Base::n, Base::coefficients, Base::motion, Base::number, Base::looks, Base::single;
-    using typename Base::real, typename Base::T, typename Base::Step, typename Base::Looks;
+    using typename Base::real, typename Base::T, typename Base::Looks;
     static constexpr bool has_events = K::events > 0, keeps = KeptFormulas::parts > 0;
     real events_[has_events ? Looks::most * Looks::columns : 1];
     KeptBy<K> kept_;
@@ -198,9 +198,9 @@ public:
         this->read_coefficients(lane);
         kept_ = lane.kept;
         T momentum[n];
-        Step::momenta(motion.rates(), coefficients, momentum);
+        motion.momenta(motion.rates(), coefficients, momentum);
         for (int c = 0; c < n; ++c) {
-            q[c] = lane_of(motion.position(c), 0);
+            q[c] = lane_of(motion.positions()[c], 0);
             p[c] = lane_of(momentum[c], 0);
         }
         Base::energy(time_of(call, index), q, p, energy);
@@ -235,7 +235,7 @@ private:
                  real tolerance, real* last, std::int64_t& events) {
         T q[n], rates[n];
         for (int c = 0; c < n; ++c) {
-            q[c] = motion.position(c);
+            q[c] = motion.positions()[c];
             rates[c] = motion.rates()[c];
         }
         remember(q, rates, last);
@@ -285,7 +285,7 @@ private:
     // t, q, p of the state before the step.
     void remember(const T* q, const T* rates, real* row) const {
         T momentum[n];
-        Step::momenta(rates, coefficients, momentum);
+        motion.momenta(rates, coefficients, momentum);
         put_state<n>(lane_of(this->begun + this->gone * T(this->step_size), 0), q, momentum, row);
     }
     void fill(DeviceLane<K>& row) const {

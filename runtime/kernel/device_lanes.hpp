@@ -50,13 +50,11 @@ struct KeptOfLane {
     template <class Given>
     LOBATTO_INLINE void observe(const LaneStepper<K, T>& motion, const Given& k, double time, double passed,
                                 bool is_first) {
-        T q[n], p[n];
-        for (int c = 0; c < n; ++c) q[c] = motion.position(c);
-        LentStep<K, T>::momenta(motion.rates(), k, p);
-        T v[n];
+        T p[n], v[n];
+        motion.momenta(motion.rates(), k, p);
         for (int c = 0; c < n; ++c) v[c] = T(KeptNumber::none);
         if constexpr (needs_velocity) velocities(motion, k, T(time), p, v);
-        observe(k, time, passed, is_first, q, p, v);
+        observe(k, time, passed, is_first, motion.positions(), p, v);
     }
     template <class Given>
     LOBATTO_INLINE void observe(const Given& k, double time, double passed, bool is_first, const T* q, const T* p,
@@ -89,7 +87,7 @@ private:
     LOBATTO_INLINE static void velocities(const LaneStepper<K, T>& motion, const Given& k, const T& time, const T* p,
                                           T* v) {
         if constexpr (K::form == Form::general) {
-            const auto known = LentStep<K, T>::velocities(motion, k, time, v);
+            const auto known = motion.velocities(k, time, v);
             for (int c = 0; c < n; ++c)
                 v[c] = any(known.have_converged | known.have_momenta) ? v[c] : T(KeptNumber::none);
         } else {
@@ -206,7 +204,7 @@ template <class K>
 LOBATTO_INLINE void keep_state(DeviceLane<K>& lane) {
     if constexpr (K::events > 0)
         for (int c = 0; c < K::coordinates; ++c) {
-            lane.watched.q_before[c] = lane.motion.position(c);
+            lane.watched.q_before[c] = lane.motion.positions()[c];
             lane.watched.rate_before[c] = lane.motion.rates()[c];
         }
 }

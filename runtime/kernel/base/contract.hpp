@@ -196,8 +196,8 @@ template <class K, bool neighbours>
 struct FixedPointOf;
 
 // How the lanes of each form move by one step: start(single, lane) takes the state of a Stepper over, step(k, time,
-// active) moves the active lanes, and answers which have moved; position(c) and momentum(single, lane, p) read. What
-// all lanes of one step size share is read by shared(), and take(shared) sets it (device_lanes.hpp).
+// active) moves the active lanes, and answers which have moved; positions(), rates() and momentum(single, lane, p)
+// read. What all lanes of one step size share is read by shared(), and take(shared) sets it (device_lanes.hpp).
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct LaneStepper;
 

@@ -22,6 +22,7 @@
 #include "convergence.hpp"
 #include "galerkin_tables.hpp"
 #include "hamilton.hpp"
+#include "lane_state.hpp"
 #include "node_mass.hpp"
 
 #ifdef __clang__  // which warns of loops that are too large to unroll, in mechanisms
@@ -372,13 +373,13 @@ private:
 };
 
 template <class K, class T, Stepping stepping>
-struct LaneStepper<K, T, Form::general, stepping> {
-    using real = typename K::real;
+struct LaneStepper<K, T, Form::general, stepping> : LaneState<K, T, false> {
+    using State = LaneState<K, T, false>;
+    using State::n, State::q, State::rate;
+    using typename State::real, typename State::ActiveMask;
     using Chain = Stepper<FallbackKernel<K>, Form::general, Stepping::solved>;
-    using ActiveMask = decltype(T() < T());
-    static constexpr int n = K::coordinates;
     using Shared = GalerkinTables<K, T>;
-    T q[n], p[n], evaluations = T(real(0));
+    static constexpr int r = K::nodes, controls = K::controls - 1;
     GalerkinFixedPoint<K, T> fixed_point;
 
     Shared shared() const { return fixed_point; }
@@ -387,42 +388,96 @@ struct LaneStepper<K, T, Form::general, stepping> {
         static_cast<Shared&>(fixed_point) = all;
     }
 
-    LOBATTO_DEVICE const T& position(int c) const { return q[c]; }
-    LOBATTO_DEVICE const T* rates() const { return p; }
     void prepare(const ScalarFallback<K>& single, int) { fixed_point.prepare(single.step_size); }
     void set_tolerance(real tolerance) { fixed_point.tolerance = tolerance; }
     void start(const ScalarFallback<K>& single, int lane) {
-        follow_state(single, lane);
+        this->follow_state(single, lane);
         real velocity[n] = {};
         const Chain& chain = single;  // with a clock: dq/dtau
         chain.velocity(chain.time(), single.q, single.p, velocity);
         fixed_point.begin(chain.coefficients, chain.time(), single.q, velocity, lane);
     }
-    void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
-        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
-    }
+    void refill(const ScalarFallback<K>& single, int lane) { start(single, lane); }
     template <class Given, class Time>
     LOBATTO_APART ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
-        const ActiveMask moved = fixed_point.step(k, time, q, p, active);
-        evaluations = fixed_point.evaluations;
+        const ActiveMask moved = fixed_point.step(k, time, q[0], rate[0], active);
+        this->evaluations = fixed_point.evaluations;
         return moved;
     }
     void follow(const ScalarFallback<K>& single, int lane) {
-        follow_state(single, lane);
+        this->follow_state(single, lane);
         fixed_point.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
         if constexpr (K::clocked) {
             set_lane(fixed_point.elapsed, lane, single.elapsed);
-            for (int i = 0; i < K::nodes; ++i) set_lane(fixed_point.rates[i], lane, single.rates[i]);
+            for (int i = 0; i < r; ++i) set_lane(fixed_point.rates[i], lane, single.rates[i]);
         }
     }
 
-private:
-    void follow_state(const ScalarFallback<K>& single, int lane) {
+    template <class Given>
+    LOBATTO_LANE void displacements(const Given&, const T&, const T*, const T*, T (*moved)[n]) const {
+        static constexpr Table table{};
         for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(p[c], lane, single.p[c]);
+            moved[0][c] = T(real(0));
+            for (int j = 0; j < controls; ++j) {
+                T sum = T(real(0));
+                for (int i = 0; i < r; ++i) sum = fused(T(table.reach[j * r + i]), fixed_point.v[c * r + i], sum);
+                moved[j + 1][c] = T(fixed_point.h) * sum;
+            }
         }
     }
+    // By Newton's iteration from the velocity of the last node (D27).
+    template <class Given>
+    LOBATTO_LANE KnownVelocities<T> velocities(const Given& k, const T& time, T* velocity) const {
+        static constexpr Table table{};
+        T change = T(real(0)), size = T(real(0)), left = T(real(0)), whole = T(real(0));
+        for (int c = 0; c < n; ++c) velocity[c] = fixed_point.v[c * r + r - 1];
+        for (int iteration = 0; iteration < 3; ++iteration) {
+            T residual[n], packed[K::mass_entries], M[n * n];
+            Formulas<K>::legendre(k, time, this->positions(), velocity, residual, packed);
+            for (int i = 0; i < n * n; ++i) M[i] = T(real(0));
+            for (int e = 0; e < K::mass_entries; ++e) M[table.row[e] * n + table.column[e]] = packed[e];
+            factor_symmetric<n>(M);
+            left = whole = T(real(0));
+            for (int c = 0; c < n; ++c) {
+                residual[c] = rate[0][c] - residual[c];
+                left += fabs(residual[c]);
+                whole += fabs(rate[0][c]);
+            }
+            solve_symmetric<n>(M, residual);
+            change = size = T(real(0));
+            for (int c = 0; c < n; ++c) {
+                velocity[c] += residual[c];
+                change += fabs(residual[c]);
+                size += fabs(velocity[c]);
+            }
+        }
+        const T root = T(Limits<real>::root_epsilon);
+        return {change <= root * size, left <= root * whole};
+    }
+    template <class Single>
+    void lend_step(const T (*moved)[n], Single& single, int lane) const {
+        this->lend_end(single, lane);
+        for (int b = 0; b < Single::active; ++b)
+            for (int j = 0; j < controls; ++j)
+                single.Y[Single::Layout::index(b, j)] = lane_of(moved[j + 1][K::active_index[b]], lane);
+        for (int c = 0; c < Single::cyclic; ++c)
+            for (int i = 0; i < r; ++i)
+                single.cyclic_rates[i * Single::cyclic + c] = lane_of(fixed_point.v[K::cyclic_index[c] * r + i], lane);
+        single.is_current = true;
+    }
+
+private:
+    struct Table {  // of K, for indices that are no constants: a device has no address of K's own
+        real reach[controls * r]{};
+        int row[K::mass_entries]{}, column[K::mass_entries]{};
+        constexpr Table() {
+            for (int i = 0; i < controls * r; ++i) reach[i] = K::reach[i];
+            for (int e = 0; e < K::mass_entries; ++e) {
+                row[e] = K::mass_row[e];
+                column[e] = K::mass_column[e];
+            }
+        }
+    };
 };
 
 }  // namespace lobatto

@@ -154,8 +154,8 @@ private:
     // A step of the chain in the lanes that move; `active`: all lanes that have not left.
     template <class Leave>
     void step(ActiveMask moving, const ActiveMask& active, T& evaluations, const Leave& leave) {
-        set_where(moving, q_before, motion.q);
-        set_where(moving, p_before, motion.p);
+        set_where(moving, q_before, motion.positions());
+        set_where(moving, p_before, motion.rates());
         const ActiveMask moved = motion.step(coefficients, now.time, moving);
         evaluations += motion.evaluations;
         if (any(moving & !moved)) this->retry(moving & !moved, now.time, evaluations, leave);
@@ -205,8 +205,8 @@ private:
         const ActiveMask here = arriving & (now.until(target) == T(real(0)));
         const T wanted = before.until(target), whole = before.until(now.time) + now.rest;
         const ActiveMask found = here | shortened.find(*this, wanted, whole, arriving & !here);
-        set_where(here, shortened.found_q, motion.q);
-        set_where(here, shortened.found_p, motion.p);
+        set_where(here, shortened.found_q, motion.positions());
+        set_where(here, shortened.found_p, motion.rates());
         bool has_left = false;
         for (int lane = 0; lane < width; ++lane) {
             if (!arriving[lane]) continue;

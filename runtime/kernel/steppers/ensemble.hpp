@@ -158,7 +158,7 @@ protected:
     // The state of a lane; `single` has its coefficients from then on.
     void state_of(int lane, real* q, real* p) const {
         single.coefficients = coefficients_of[lane];
-        for (int c = 0; c < n; ++c) q[c] = lane_of(motion.position(c), lane);
+        for (int c = 0; c < n; ++c) q[c] = lane_of(motion.positions()[c], lane);
         motion.momentum(single, lane, p);
     }
 

@@ -10,6 +10,7 @@
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
+#include "../iteration/lane_state.hpp"
 #include "../iteration/tangent.hpp"
 
 namespace lobatto {
@@ -191,41 +192,31 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : ConstantMass<K> {
 };
 
 template <class K, class T>
-struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
-    using real = typename K::real;
-    using ActiveMask = decltype(T() < T());
-    static constexpr int n = K::coordinates;
-    T q[n], p[n], evaluations = T(real(0));
+struct LaneStepper<K, T, Form::linear_map, Stepping::solved> : LaneState<K, T, false> {
+    using State = LaneState<K, T, false>;
+    using State::n, State::q, State::rate;
+    using typename State::real, typename State::ActiveMask;
     struct Shared {};  // the map is of a trajectory's parameters
 
     Shared shared() const { return {}; }
     template <bool>
     LOBATTO_INLINE void take(const Shared&) {}
-    LOBATTO_DEVICE const T& position(int c) const { return q[c]; }
-    LOBATTO_DEVICE const T* rates() const { return p; }
 
     void prepare(const ScalarFallback<K>&, int) {}
     void set_tolerance(real) {}
-    void start(const ScalarFallback<K>& single, int lane) { follow(single, lane); }
-    void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
-        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
-    }
+    void start(const ScalarFallback<K>& single, int lane) { this->follow_state(single, lane); }
+    void refill(const ScalarFallback<K>& single, int lane) { this->follow_state(single, lane); }
+    void follow(const ScalarFallback<K>& single, int lane) { this->follow_state(single, lane); }
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step(const Given& k, const Time&, ActiveMask active) {
         T q1[n], p1[n];
-        K::propagate(k, q, p, q1, p1);
+        K::propagate(k, q[0], rate[0], q1, p1);
         active = active & (not_finite_part(q1, n) + not_finite_part(p1, n) == T(real(0)));
         for (int c = 0; c < n; ++c) {
-            q[c] = select(active, q1[c], q[c]);
-            p[c] = select(active, p1[c], p[c]);
+            q[0][c] = select(active, q1[c], q[0][c]);
+            rate[0][c] = select(active, p1[c], rate[0][c]);
         }
         return active;
-    }
-    void follow(const ScalarFallback<K>& single, int lane) {
-        for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(p[c], lane, single.p[c]);
-        }
     }
 };
 

@@ -12,7 +12,6 @@
 
 #include "ensemble.hpp"
 #include "events.hpp"
-#include "lent_steps.hpp"
 #include "watch.hpp"
 
 namespace lobatto {
@@ -41,7 +40,6 @@ struct LaneSamples {
     using T = Pack<real, width>;
     using ActiveMask = decltype(T() < T());
     using Motion = LaneStepper<K, T>;
-    using Step = LentStep<K, T>;
     using Sampled = Events<FallbackKernel<K>>;
     static constexpr int n = K::coordinates, basis = SamplePlaces<K>::basis, places = SamplePlaces<K>::places;
     static constexpr int pieces = Sampled::pieces;
@@ -53,7 +51,7 @@ struct LaneSamples {
     template <class Given>
     LOBATTO_LANE ActiveMask restless(const SamplePlaces<K>& at, const Motion& motion, const Given& k, const T& begun,
                                      const T& gone, real h, const T* q_before, const T* rate_before) {
-        Step::displacements(motion, k, begun + gone * T(h), q_before, rate_before, moved);
+        motion.displacements(k, begun + gone * T(h), q_before, rate_before, moved);
         T y[places][K::events];
         for (int i = 0; i < places; ++i) {
             T q[n], velocity[n];
@@ -68,11 +66,10 @@ struct LaneSamples {
             }
             Formulas<K>::event(k, begun + (gone + T(at.grid[i])) * T(h), q, velocity, y[i]);
         }
-        T q[n], velocity[n], end[K::events];
+        T velocity[n], end[K::events];
         const T next = begun + (gone + T(real(1))) * T(h);
-        for (int c = 0; c < n; ++c) q[c] = motion.position(c);
-        ActiveMask quiet = Step::velocities(motion, k, next, velocity).have_converged;
-        Formulas<K>::event(k, next, q, velocity, end);
+        ActiveMask quiet = motion.velocities(k, next, velocity).have_converged;
+        Formulas<K>::event(k, next, motion.positions(), velocity, end);
         for (int e = 0; e < K::events; ++e) quiet = quiet & is_quiet(e, y, end[e]);
         return !quiet;
     }
@@ -158,7 +155,6 @@ struct RefilledEnsemble : Ensemble<K, width> {
     using Base::n, Base::lanes, Base::coefficients, Base::motion, Base::parameters, Base::coefficients_of, Base::single,
         Base::step_size, Base::steps;
     using typename Base::real, typename Base::T, typename Base::ActiveMask;
-    using Step = LentStep<K, T>;
     static constexpr int columns = 1 + 2 * n;
     static constexpr bool has_events = K::events > 0;
     using Looks = std::conditional_t<has_events, LaneWatch<K, width>, NoLaneWatch<K, width>>;
@@ -212,7 +208,7 @@ struct RefilledEnsemble : Ensemble<K, width> {
         while (taken < call.steps && taken < call.capacity && !has_left && any(active)) {
             T q_before[n], rate_before[n];
             for (int c = 0; c < n; ++c) {
-                q_before[c] = motion.position(c);
+                q_before[c] = motion.positions()[c];
                 rate_before[c] = motion.rates()[c];
             }
             const T time = begun + gone * T(step_size), next = begun + (gone + T(real(1))) * T(step_size);
@@ -255,7 +251,7 @@ protected:
         coefficients_of[lane] = single.coefficients;
         set_coefficients<K>(coefficients, lane, single.coefficients);
         motion.prepare(single, lane);
-        Step::refill(motion, single, lane);
+        motion.refill(single, lane);
         looks.start(single, lane);
         begun.set(lane, time);
         gone.set(lane, real(0));
@@ -264,14 +260,9 @@ protected:
     // Into the rows of all lanes, `stride` apart.
     void record(const T& time, real* row, std::int64_t stride) const {
         T momentum[n];
-        Step::momenta(motion.rates(), coefficients, momentum);
-        for (int lane = 0; lane < width; ++lane, row += stride) {
-            row[0] = lane_of(time, lane);
-            for (int c = 0; c < n; ++c) {
-                row[1 + c] = lane_of(motion.position(c), lane);
-                row[1 + n + c] = lane_of(momentum[c], lane);
-            }
-        }
+        motion.momenta(motion.rates(), coefficients, momentum);
+        for (int lane = 0; lane < width; ++lane, row += stride)
+            put_state<n>(lane_of(time, lane), motion.positions(), momentum, row, lane);
     }
 
     Status look(int lane, const T* q_before, const T* rate_before, real tolerance, real* rows, std::int64_t& count) {
@@ -279,9 +270,9 @@ protected:
             to.tolerance = tolerance;
             to.start_time = lane_of(begun, lane);
             to.steps = static_cast<std::int64_t>(lane_of(gone, lane));
-            Step::lend_state(q_before, rate_before, to, lane);
+            motion.lend_state(q_before, rate_before, to, lane);
             watch.keep(to);
-            Step::lend_step(motion, looks.moved, to, lane);
+            motion.lend_step(looks.moved, to, lane);
             ++to.steps;
         };
         return looks.look(parameters[lane], step_size, lend, lane, rows, count);

@@ -14,6 +14,7 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "../base/rows.hpp"
+#include "../iteration/lane_state.hpp"
 #include "../iteration/tangent.hpp"
 
 namespace lobatto {
@@ -365,12 +366,11 @@ private:
 };
 
 template <class K, class T>
-struct LaneStepper<K, T, Form::separable, Stepping::composition> {
-    using real = typename K::real;
-    using ActiveMask = decltype(T() < T());
-    static constexpr int n = K::coordinates;
-    int now{};  // the present; 1 - now: room for the next
-    T q[2][n], u[2][n], W[2][n], evaluations = T(real(0));
+struct LaneStepper<K, T, Form::separable, Stepping::composition> : LaneState<K, T, true, 2> {
+    using State = LaneState<K, T, true, 2>;
+    using State::n, State::q, State::now;
+    using typename State::real, typename State::ActiveMask;
+    T W[2][n];
     Composition<K> composition;
     real h;
     struct Shared {  // by all trajectories of one step size
@@ -384,22 +384,17 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
         composition = all.composition;
         h = all.h;
     }
-    LOBATTO_DEVICE const T& position(int c) const { return q[now][c]; }
-    LOBATTO_DEVICE const T* rates() const { return u[now]; }
     void prepare(const ScalarFallback<K>& single, int) {
         composition = single.composition;
         h = single.step_size;
     }
     void set_tolerance(real) {}
     void start(const ScalarFallback<K>& single, int lane) { follow(single, lane); }
-    void momentum(const ScalarFallback<K>& single, int lane, real* momentum) const {
-        real velocity[n];
-        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[now][c], lane);
-        K::momentum(single.coefficients, velocity, momentum);
-    }
+    void refill(const ScalarFallback<K>& single, int lane) { follow(single, lane); }
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const int next = 1 - now;
+        auto& u = this->rate;
         T not_finite = T(real(0));
         if constexpr (K::immediate) {
             immediate_step<K>(composition, k, time, q[now], u[now], W[now], q[next], u[next], W[next]);
@@ -430,11 +425,28 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
         return active;
     }
     void follow(const ScalarFallback<K>& single, int lane) {
+        this->follow_state(single, lane);
+        for (int c = 0; c < n; ++c) set_lane(W[now][c], lane, single.minus_acceleration(c));
+    }
+
+    template <class Given>
+    LOBATTO_LANE void displacements(const Given& k, const T& time, const T* q_before, const T* u_before,
+                                    T (*moved)[n]) const {
+        T start[n], end[n];
+        Formulas<K>::minus_acceleration(k, time, q_before, start);
+        Formulas<K>::minus_acceleration(k, time + T(h), this->positions(), end);
         for (int c = 0; c < n; ++c) {
-            set_lane(q[now][c], lane, single.q[c]);
-            set_lane(u[now][c], lane, single.u[c]);
-            set_lane(W[now][c], lane, single.minus_acceleration(c));
+            moved[0][c] = q[now][c] - q_before[c];
+            moved[1][c] = T(h) * u_before[c];
+            moved[2][c] = T(h) * this->rate[now][c];
+            moved[3][c] = T(h) * (T(h) * start[c]);
+            moved[4][c] = T(h) * (T(h) * end[c]);
         }
+    }
+    template <class Single>
+    void lend_step(const T (*)[n], Single& single, int lane) const {
+        this->lend_end(single, lane);
+        single.ends.of = -1;
     }
 };
 
