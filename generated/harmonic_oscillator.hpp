@@ -15,13 +15,13 @@
 
 #include "kernel.hpp"
 
-namespace lobatto::kernels { inline namespace of_cab3db5cdb35e953 {
+namespace lobatto::kernels { inline namespace of_9d7d90533142377f {
 
-struct harmonic_oscillator {
+struct harmonic_oscillator : lobatto::KernelDefaults {
     using real = double;
 
     static constexpr const char* name = "harmonic_oscillator";
-    static constexpr const char* digest = "cab3db5cdb35e953";
+    static constexpr const char* digest = "9d7d90533142377f";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::linear_map;  // how a step is taken
     static constexpr int coordinates = 1;       // n
@@ -33,10 +33,7 @@ struct harmonic_oscillator {
     static constexpr bool has_energy = true;    // asked for by the scene
     static constexpr bool has_tangent = true;   // the derivative of a step
     static constexpr int parameter_count = 2;   // in the order of the scene
-    static constexpr int events = 0;            // that are watched for
-    static constexpr int event_direction[1] = {};
     static constexpr int points = 4;            // nodes of a step, both ends included
-    static constexpr bool is_explicit = false;  // the inner nodes are solved for
     static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
     static constexpr int entry_row[1] = {0};
     static constexpr int entry_column[1] = {0};

@@ -14,32 +14,24 @@
 
 #include "kernel.hpp"
 
-namespace lobatto::kernels { inline namespace of_911777cba86669e1 {
+namespace lobatto::kernels { inline namespace of_7723d3c1a30c689c {
 
-struct pendulum {
+struct pendulum : lobatto::KernelDefaults {
     using real = double;
 
     static constexpr const char* name = "pendulum";
-    static constexpr const char* digest = "911777cba86669e1";
+    static constexpr const char* digest = "7723d3c1a30c689c";
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr lobatto::Form form = lobatto::Form::separable;  // how a step is taken
     static constexpr int coordinates = 1;       // n
     static constexpr int order = 6;             // of accuracy in h
     static constexpr int unknowns = 2;          // of the equations of a step; 0: none to solve
     static constexpr bool any_number = true;    // formulas are templates on the type of numbers: fixed-point iteration first
-    static constexpr bool linear = false;       // all second derivatives are constant
     static constexpr bool autonomous = true;    // no formula holds the time
     static constexpr bool has_energy = true;    // asked for by the scene
     static constexpr bool has_tangent = true;   // the derivative of a step
     static constexpr int parameter_count = 2;   // in the order of the scene
-    static constexpr int events = 0;            // that are watched for
-    static constexpr int event_direction[1] = {};
     static constexpr int points = 4;            // nodes of a step, both ends included
-    static constexpr bool is_explicit = false;  // the inner nodes are solved for
-    static constexpr bool diagonal_part = false;  // nothing is taken into the stage map
-    static constexpr bool neighbours = false;   // coordinates are taken one by one
-    static constexpr bool clean = false;        // steps as fast as can be
-    static constexpr bool absorbed = false;     // Newton's iteration has its own Jacobians
     static constexpr int entries = 1;           // of M^-1 V'' that are not identically zero
     static constexpr int entry_row[1] = {0};
     static constexpr int entry_column[1] = {0};

@@ -47,7 +47,8 @@ public:
     }
 
     std::string formulas(const std::string& name) const {
-        std::string text = fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} {{\n", name);
+        std::string text =
+            fmt::format("\nnamespace lobatto::kernels {{\n\nstruct {} : lobatto::KernelDefaults {{\n", name);
         text += shapes(d_, options_.precision, name) + costs() + near_angles() + tables(d_, options_.precision) +
                 measured_values(p_, options_.precision) + (d_.structure.looped ? looped_.tables() : "") +
                 parameters(d_.scene, options_.precision, Values::left_out) + coefficients() + prepare(name) +
@@ -97,12 +98,9 @@ private:
                options_.precision == Precision::double_;
     }
     std::string near_angles() const {
-        if (d_.structure.form() != StepForm::general) return "";
-        const std::string comment = angles_.empty()
-                                        ? "stage computes all its sines and cosines anew"
-                                        : "whose sines and cosines stage is given, anew or from those of angles near";
+        if (angles_.empty()) return "";
         return fmt::format("    {:<42}  // {}\n", fmt::format("static constexpr int angles = {};", angles_.size()),
-                           comment);
+                           "whose sines and cosines stage is given, anew or from those of angles near");
     }
     bool takes_angles(const Declaration& declaration) const {
         return !angles_.empty() && std::string(declaration.program) == "stage";

@@ -20,6 +20,11 @@ void line(std::string& text, const std::string& declaration, const std::string& 
     text += fmt::format("    {:<42}  // {}\n", "static constexpr " + declaration + ";", comment);
 }
 
+// One that holds; where none does, KernelDefaults of runtime/kernel/base/contract.hpp says so.
+void claim(std::string& text, const std::string& name, bool holds, const std::string& comment) {
+    if (holds) line(text, "bool " + name + " = true", comment);
+}
+
 // Rows and columns of a sparse matrix.
 std::string places(const std::string& of, const std::vector<std::pair<int, int>>& entries) {
     std::vector<int> rows, columns;
@@ -57,31 +62,21 @@ std::string summand_rows(const std::string& of, const std::vector<std::vector<Gi
 std::string separable_shapes(const Structure& structure, const System& system, int nodes, Precision precision) {
     std::string text;
     line(text, fmt::format("int points = {}", nodes), "nodes of a step, both ends included");
-    line(text, fmt::format("bool is_explicit = {}", structure.is_explicit()),
-         structure.is_explicit() ? "kicks and drifts in turn" : "the inner nodes are solved for");
+    claim(text, "is_explicit", structure.is_explicit(), "kicks and drifts in turn");
     if (structure.form() == StepForm::separable) {
-        line(text, fmt::format("bool diagonal_part = {}", structure.diagonal_part()),
-             structure.diagonal_part() ? "taken into the stage map: the constant part of M^-1 V''"
-                                       : "nothing is taken into the stage map");
-        line(text, fmt::format("bool neighbours = {}", structure.neighbours() && has_lanes(precision)),
-             structure.neighbours() ? "formulas go along neighbouring coordinates, which lie in lanes"
-                                    : "coordinates are taken one by one");
+        claim(text, "diagonal_part", structure.diagonal_part(),
+              "taken into the stage map: the constant part of M^-1 V''");
+        claim(text, "neighbours", structure.neighbours() && has_lanes(precision),
+              "formulas go along neighbouring coordinates, which lie in lanes");
         if (structure.neighbours() && has_lanes(precision)) {
             line(text, fmt::format("int row_reach = {}", row_reach(structure.elements)),
                  "how far formulas reach from the first coordinate on; -1: their runs begin elsewhere");
-            const bool immediate = is_one_pass(structure.elements, structure.separable().fixed_ends, system.q);
-            const bool unit_masses = has_unit_masses(system);
-            line(text, fmt::format("bool unit_masses = {}", unit_masses),
-                 unit_masses ? "forces are accelerations" : "forces are divided by them");
-            line(text, fmt::format("bool immediate = {}", immediate),
-                 immediate ? "coordinates may move one after another, each as soon as its force is known"
-                           : "coordinates move when all forces are known");
+            claim(text, "unit_masses", has_unit_masses(system), "forces are accelerations");
+            claim(text, "immediate", is_one_pass(structure.elements, structure.separable().fixed_ends, system.q),
+                  "coordinates may move one after another, each as soon as its force is known");
         }
-        line(text, fmt::format("bool clean = {}", structure.clean()),
-             structure.clean() ? "round-off-clean steps" : "steps as fast as can be");
-        line(text, fmt::format("bool absorbed = {}", structure.absorbed()),
-             structure.absorbed() ? "Newton's iteration has the Jacobian of V's quadratic part"
-                                  : "Newton's iteration has its own Jacobians");
+        claim(text, "clean", structure.clean(), "round-off-clean steps");
+        claim(text, "absorbed", structure.absorbed(), "Newton's iteration has the Jacobian of V's quadratic part");
     }
     line(text, fmt::format("int entries = {}", structure.constant_mass().entries.size()),
          "of M^-1 V'' that are not identically zero");
@@ -102,23 +97,21 @@ std::string general_shapes(const Derivation& d) {
     text += has_full_matrix(d) ? full_places("entry", 2 * d.system.n) : places("entry", entries);
     line(text, fmt::format("int mass_entries = {}", mass.size()), "of M = d2L/dvdv that are not identically zero");
     text += places("mass", mass);
-    if (d.system.momentum_v.holds_any(d.system.v) && d.system.constraints.empty() && !d.scene.clock)
-        line(text, "bool mass_needs_velocity = true", "M changes with velocities");
-    line(text, fmt::format("bool constant_mass = {}", d.system.constant_mass),
-         d.system.constant_mass ? "and forces without velocities" : "or forces hold velocities");
-    const bool scaled = uses_scaled_mass(d.scene, d.system, d.structure);
-    line(text, fmt::format("bool scaled_mass = {}", scaled),
-         scaled ? "M is one function times a constant matrix" : "masses change in different ways");
+    claim(text, "mass_needs_velocity",
+          d.system.momentum_v.holds_any(d.system.v) && d.system.constraints.empty() && !d.scene.clock,
+          "M changes with velocities");
+    claim(text, "constant_mass", d.system.constant_mass, "and forces without velocities");
+    claim(text, "scaled_mass", uses_scaled_mass(d.scene, d.system, d.structure),
+          "M is one function times a constant matrix");
     const bool hamiltonian = d.structure.hamiltonian().has_value();
-    line(text, fmt::format("bool hamiltonian = {}", hamiltonian),
-         hamiltonian ? "velocities and forces are formulas of positions and momenta"
-                     : "velocities of momenta are solved for");
-    const auto slopes = places_of(d.system.constraint_q);
-    line(text, fmt::format("int constraints = {}", d.system.constraints.size()), "phi(q, t) = 0");
-    line(text, fmt::format("int constraint_entries = {}", slopes.size()),
-         "of G = dphi/dq that are not identically zero");
-    text += places("constraint", slopes);
-    if (!d.system.constraints.empty()) text += summand_rows("constraint", d.system.constraint_summands());
+    claim(text, "hamiltonian", hamiltonian, "velocities and forces are formulas of positions and momenta");
+    if (!d.system.constraints.empty()) {
+        const auto slopes = places_of(d.system.constraint_q);
+        line(text, fmt::format("int constraints = {}", d.system.constraints.size()), "phi(q, t) = 0");
+        line(text, fmt::format("int constraint_entries = {}", slopes.size()),
+             "of G = dphi/dq that are not identically zero");
+        text += places("constraint", slopes) + summand_rows("constraint", d.system.constraint_summands());
+    }
     if (!hamiltonian && d.system.momenta_cancel()) text += summand_rows("momentum", d.system.momentum_summands());
     return text;
 }
@@ -224,6 +217,7 @@ std::string type_name(Precision precision) {
 std::string watched_shapes(const Scene& scene) {
     std::string text;
     const std::vector<Event> watched = scene.watched();
+    if (watched.empty()) return text;
     line(text, fmt::format("int events = {}", watched.size()), "that are watched for");
     std::vector<int> directions, reset_of, passage_of;
     for (const Event& event : watched) directions.push_back(event.direction);
@@ -234,14 +228,13 @@ std::string watched_shapes(const Scene& scene) {
         if (passes) direction = 0;
     }
     text += integer_table("event_direction", directions);
-    if (watched.empty()) return text;
     int resets = 0;
     for (const Impact& impact : scene.impacts) reset_of.push_back(impact.reset_position.empty() ? -1 : resets++);
-    line(text, fmt::format("int stops = {}", scene.run.stops.size()), "which end the motion");
-    line(text, fmt::format("int impacts = {}", scene.impacts.size()), "walls that throw it back");
-    line(text, fmt::format("int switches = {}", scene.switches.size()),
-         "where formulas change; the last parameters are the sides");
+    if (!scene.run.stops.empty())
+        line(text, fmt::format("int stops = {}", scene.run.stops.size()), "which end the motion");
     if (!scene.switches.empty()) {
+        line(text, fmt::format("int switches = {}", scene.switches.size()),
+             "where formulas change; the last parameters are the sides");
         std::vector<int> refraction_of;
         int refractions = 0;
         for (const Switch& one : scene.switches) refraction_of.push_back(one.refracts ? refractions++ : -1);
@@ -249,6 +242,7 @@ std::string watched_shapes(const Scene& scene) {
         text += integer_table("refraction_of", refraction_of);
     }
     if (scene.impacts.empty()) return text;
+    line(text, fmt::format("int impacts = {}", scene.impacts.size()), "walls that throw it back");
     line(text, fmt::format("int resets = {}", resets), "walls with an outcome of their own");
     text += integer_table("reset_of", reset_of);
     const auto passages = std::count_if(passage_of.begin(), passage_of.end(), [](int one) { return one != 0; });
@@ -281,16 +275,14 @@ std::string shapes(const Derivation& d, Precision precision, const std::string& 
     line(text, fmt::format("bool any_number = {}", iterates),
          iterates ? "formulas are templates on the type of numbers: fixed-point iteration first"
                   : "Newton's iteration alone");
-    line(text, fmt::format("bool linear = {}", structure.linear), "all second derivatives are constant");
+    claim(text, "linear", structure.linear, "all second derivatives are constant");
     line(text, fmt::format("bool autonomous = {}", d.system.autonomous), "no formula holds the time");
     line(text, fmt::format("bool has_energy = {}", d.scene.has_energy()), "asked for by the scene");
     line(text, fmt::format("bool has_tangent = {}", has_tangent(d)), "the derivative of a step");
-    if (structure.form() == StepForm::general)
-        line(text, fmt::format("bool clocked = {}", d.scene.clock.has_value()),
-             d.scene.clock ? "steps are equally long in tau, dt = clock(q) dtau" : "steps are equally long in time");
+    claim(text, "clocked", d.scene.clock.has_value(), "steps are equally long in tau, dt = clock(q) dtau");
+    claim(text, "has_time_coordinate", d.scene.has_time_coordinate(), "the last one (D64)");
     if (d.scene.has_time_coordinate())
-        line(text, fmt::format("double pace_exponent = {}", pace_exponent(d.scene.clock->rate).to_double()),
-             "a; the last coordinate is the time (D64)");
+        line(text, fmt::format("double pace_exponent = {}", pace_exponent(d.scene.clock->rate).to_double()), "a");
     line(text, fmt::format("int parameter_count = {}", d.scene.parameters.size() - (d.scene.clock ? 1 : 0)),
          d.scene.has_time_coordinate() ? "in the order of the scene; the one after them is sigma (D64)"
          : d.scene.clock               ? "in the order of the scene; the one after them is the energy at the start"

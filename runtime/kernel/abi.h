@@ -11,8 +11,8 @@
  *             j + 1, the last of which is the end of the step, or a multiplier at control point j (n_a coordinates and
  *             the multipliers of the constraints together); then kappa of every cyclic coordinate.
  * Every function that can fail returns a lobatto_status and leaves the state of the last good step untouched. No
- * function allocates, locks, prints or keeps a pointer it was given. A stepper may keep its work arrays in its memory:
- * do not use one from two threads, not even through `const void*`.
+ * function locks, prints or keeps a pointer it was given. What looks for events allocates in each call, steps do not. A
+ * stepper may keep its work arrays in its memory: do not use one from two threads, not even through `const void*`.
  */
 #ifndef LOBATTO_KERNEL_ABI_H
 #define LOBATTO_KERNEL_ABI_H

@@ -24,17 +24,11 @@ concept KernelOfAnyForm = requires(const typename K::Parameters& values, typenam
     { K::unknowns } -> std::convertible_to<int>;
     { K::parameter_count } -> std::convertible_to<int>;
     { K::any_number } -> std::convertible_to<bool>;
-    { K::linear } -> std::convertible_to<bool>;
     { K::autonomous } -> std::convertible_to<bool>;
     { K::has_energy } -> std::convertible_to<bool>;
     { K::has_tangent } -> std::convertible_to<bool>;
-    { K::events } -> std::convertible_to<int>;
 }
-&&(K::coordinates > 0) && (K::events == 0 || requires {
-    K::event_direction[K::events - 1];
-    { K::stops } -> std::convertible_to<int>;
-    { K::impacts } -> std::convertible_to<int>;
-});
+&&(K::coordinates > 0) && std::derived_from<K, KernelDefaults>;
 
 // The formulas of a constant mass matrix. `k`, then the time unless the kernel is autonomous, then arrays.
 template <class K, class... Time>
@@ -91,17 +85,12 @@ concept LinearMapKernel = KernelOfAnyForm<K> && K::form ==
                           Form::linear_map&& K::autonomous&& ConstantMassFormulas<K>&& requires(
                               const typename K::Coefficients& k, const typename K::real* in, typename K::real* out) {
     K::propagate(k, in, in, out, out);
-    { K::is_explicit } -> std::convertible_to<bool>;
 };
 
 template <class K>
 concept SeparableKernel = KernelOfAnyForm<K> && K::form == Form::separable &&
                           (K::autonomous ? ConstantMassFormulas<K>
                                          : ConstantMassFormulas<K, typename K::real>)&&requires {
-    { K::is_explicit } -> std::convertible_to<bool>;
-    { K::clean } -> std::convertible_to<bool>;
-    { K::absorbed } -> std::convertible_to<bool>;
-    { K::diagonal_part } -> std::convertible_to<bool>;
     { K::uses_hessian } -> std::convertible_to<bool>;
     { K::entries } -> std::convertible_to<int>;
     K::entry_row[0];
@@ -138,13 +127,12 @@ concept GeneralKernel = KernelOfAnyForm<K> && K::form == Form::general&& OrderOf
     K::D[K::nodes * K::controls - 1];
     K::extrapolation[K::controls * K::controls - 1];
     K::legendre_polynomial[0];
-    { K::constant_mass } -> std::convertible_to<bool>;
-    { K::scaled_mass } -> std::convertible_to<bool>;
-    { K::constraints } -> std::convertible_to<int>;
-    { K::constraint_entries } -> std::convertible_to<int>;
-    K::constraint_row[0];
-    K::constraint_column[0];
-};
+}
+&&(!K::any_number || requires {
+    K::integration[K::nodes * K::nodes - 1];
+    K::reach[(K::controls - 1) * K::nodes - 1];
+    K::ahead[K::nodes * K::nodes - 1];
+});
 
 template <class K>
 concept Kernel = LinearMapKernel<K> || SeparableKernel<K> || GeneralKernel<K>;

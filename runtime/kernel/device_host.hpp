@@ -129,7 +129,7 @@ template <class K>
 class HostLane<K, true> : LaneOnHost<K, RefilledEnsemble<K, 1> > {
     using Base = LaneOnHost<K, RefilledEnsemble<K, 1> >;
     using Base::n, Base::coefficients, Base::motion, Base::number, Base::looks, Base::single;
-    using typename Base::real, typename Base::T, typename Base::Step, typename Base::Looks;
+    using typename Base::real, typename Base::T, typename Base::Looks;
     static constexpr bool has_events = K::events > 0, keeps = KeptFormulas::parts > 0;
     real events_[has_events ? Looks::most * Looks::columns : 1];
     KeptBy<K> kept_;
@@ -198,9 +198,9 @@ public:
         this->read_coefficients(lane);
         kept_ = lane.kept;
         T momentum[n];
-        Step::momenta(motion.rates(), coefficients, momentum);
+        motion.momenta(motion.rates(), coefficients, momentum);
         for (int c = 0; c < n; ++c) {
-            q[c] = lane_of(motion.position(c), 0);
+            q[c] = lane_of(motion.positions()[c], 0);
             p[c] = lane_of(momentum[c], 0);
         }
         Base::energy(time_of(call, index), q, p, energy);
@@ -235,7 +235,7 @@ private:
                  real tolerance, real* last, std::int64_t& events) {
         T q[n], rates[n];
         for (int c = 0; c < n; ++c) {
-            q[c] = motion.position(c);
+            q[c] = motion.positions()[c];
             rates[c] = motion.rates()[c];
         }
         remember(q, rates, last);
@@ -244,9 +244,17 @@ private:
         if (status != Status::not_converged) return status;
         real record[1 + 2 * n];
         std::int64_t done = 0, iterations = 0;
+        lobatto_refilled_advance step{};
+        step.steps = step.capacity = 1;
+        step.tolerance = static_cast<double>(tolerance);
+        step.records = record;
+        step.events = has_events && call.watches != 0 ? events_ : nullptr;
+        step.event_capacity = Looks::most;
+        step.steps_done = &done;
+        step.iterations = &iterations;
+        step.events_written = &events;
         status = Status::ok;
-        this->advance(1, tolerance, record, 1, has_events && call.watches != 0 ? events_ : nullptr, Looks::most,
-                      &status, &done, &iterations, &events);
+        this->advance(step, &status);
         call.steps[index] += done;
         call.iterations[index] += iterations;
         return status;
@@ -277,12 +285,8 @@ private:
     // t, q, p of the state before the step.
     void remember(const T* q, const T* rates, real* row) const {
         T momentum[n];
-        Step::momenta(rates, coefficients, momentum);
-        row[0] = lane_of(this->begun + this->gone * T(this->step_size), 0);
-        for (int c = 0; c < n; ++c) {
-            row[1 + c] = lane_of(q[c], 0);
-            row[1 + n + c] = lane_of(momentum[c], 0);
-        }
+        motion.momenta(rates, coefficients, momentum);
+        put_state<n>(lane_of(this->begun + this->gone * T(this->step_size), 0), q, momentum, row);
     }
     void fill(DeviceLane<K>& row) const {
         row.coefficients = coefficients;
@@ -295,7 +299,21 @@ private:
 #endif
 
 template <class K, bool has_lanes = has_device_lanes<K>()>
-struct ExportDeviceLanes {
+struct ExportDeviceLanes;
+// None, and the functions are null.
+template <class K>
+struct ExportDeviceLanes<K, false> {
+    static constexpr lobatto_device_lanes empty_table() {
+        lobatto_device_lanes t{};
+        t.abi_version = LOBATTO_ABI_VERSION;
+        t.bytes = sizeof(lobatto_device_lanes);
+        t.digest = K::digest;
+        return t;
+    }
+    static constexpr lobatto_device_lanes table = empty_table();
+};
+template <class K>
+struct ExportDeviceLanes<K, true> {
     using real = typename K::real;
     using Host = HostLane<K>;
     using Shared = SharedByLanes<K>;
@@ -364,45 +382,26 @@ struct ExportDeviceLanes {
             lane.state(*call, l, out(q) + l * n, out(p) + l * n, out(energy) + l, out(kept) + l * KeptFormulas::parts);
     }
 
-    static constexpr lobatto_device_lanes table = {LOBATTO_ABI_VERSION,
-                                                   sizeof(lobatto_device_lanes),
-                                                   K::digest,
-                                                   device_words<K>,
-                                                   MovingWords<K>::first,
-                                                   MovingWords<K>::count,
-                                                   sizeof(Shared),
-                                                   alignof(Shared),
-                                                   sizeof(Host),
-                                                   alignof(Host),
-                                                   Host::columns,
-                                                   KeptFormulas::parts,
-                                                   place,
-                                                   shared,
-                                                   own,
-                                                   advance,
-                                                   retake,
-                                                   state};
-};
-template <class K>
-struct ExportDeviceLanes<K, false> {
-    static constexpr lobatto_device_lanes table = {LOBATTO_ABI_VERSION,
-                                                   sizeof(lobatto_device_lanes),
-                                                   K::digest,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   0,
-                                                   nullptr,
-                                                   nullptr,
-                                                   nullptr,
-                                                   nullptr,
-                                                   nullptr,
-                                                   nullptr};
+    static constexpr lobatto_device_lanes filled_table() {
+        lobatto_device_lanes t = ExportDeviceLanes<K, false>::table;
+        t.words = device_words<K>;
+        t.first_moving = MovingWords<K>::first;
+        t.moving = MovingWords<K>::count;
+        t.shared_bytes = sizeof(Shared);
+        t.shared_alignment = alignof(Shared);
+        t.host_bytes = sizeof(Host);
+        t.host_alignment = alignof(Host);
+        t.columns = Host::columns;
+        t.kept = KeptFormulas::parts;
+        t.place = place;
+        t.shared = shared;
+        t.own = own;
+        t.advance = advance;
+        t.retake = retake;
+        t.state = state;
+        return t;
+    }
+    static constexpr lobatto_device_lanes table = filled_table();
 };
 
 }  // namespace lobatto

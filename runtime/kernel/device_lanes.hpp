@@ -34,7 +34,7 @@ struct KeptFormulas {  // nothing is kept
 
 #ifdef LOBATTO_DEVICE_WATCHES
 template <class K>
-constexpr bool has_watched_lanes = impacts_of<K>() == 0 && switches_of<K>() == 0;
+constexpr bool has_watched_lanes = K::impacts == 0 && K::switches == 0;
 
 // What is kept of a lane's trajectory so far. Formulas are in double.
 template <class K>
@@ -50,13 +50,11 @@ struct KeptOfLane {
     template <class Given>
     LOBATTO_INLINE void observe(const LaneStepper<K, T>& motion, const Given& k, double time, double passed,
                                 bool is_first) {
-        T q[n], p[n];
-        for (int c = 0; c < n; ++c) q[c] = motion.position(c);
-        LentStep<K, T>::momenta(motion.rates(), k, p);
-        T v[n];
+        T p[n], v[n];
+        motion.momenta(motion.rates(), k, p);
         for (int c = 0; c < n; ++c) v[c] = T(KeptNumber::none);
         if constexpr (needs_velocity) velocities(motion, k, T(time), p, v);
-        observe(k, time, passed, is_first, q, p, v);
+        observe(k, time, passed, is_first, motion.positions(), p, v);
     }
     template <class Given>
     LOBATTO_INLINE void observe(const Given& k, double time, double passed, bool is_first, const T* q, const T* p,
@@ -89,21 +87,20 @@ private:
     LOBATTO_INLINE static void velocities(const LaneStepper<K, T>& motion, const Given& k, const T& time, const T* p,
                                           T* v) {
         if constexpr (K::form == Form::general) {
-            decltype(T() < T()) has_momenta;
-            const bool is_converged = any(LentStep<K, T>::velocities(motion, k, time, v, &has_momenta));
-            for (int c = 0; c < n; ++c) v[c] = is_converged || any(has_momenta) ? v[c] : T(KeptNumber::none);
+            const auto known = motion.velocities(k, time, v);
+            for (int c = 0; c < n; ++c)
+                v[c] = any(known.have_converged | known.have_momenta) ? v[c] : T(KeptNumber::none);
         } else {
             K::velocity(k, p, v);
         }
     }
 };
 
-struct NothingKept {};
 struct NoPlaces {
     void prepare() {}
 };
 template <class K>
-using KeptBy = std::conditional_t<(KeptFormulas::parts > 0), KeptOfLane<K>, NothingKept>;
+using KeptBy = std::conditional_t<(KeptFormulas::parts > 0), KeptOfLane<K>, Nothing>;
 template <class K>
 using PlacesOfLanes = std::conditional_t<(K::events > 0), SamplePlaces<K>, NoPlaces>;
 
@@ -143,10 +140,8 @@ constexpr bool has_device_lanes() {
 #ifdef LOBATTO_DEVICE_WATCHES
     if (!has_watched_lanes<K>) return false;
 #endif
-    if constexpr (ensemble_lanes<K>(1) == 0)
+    if constexpr (ensemble_lanes<K>(1) == 0 || K::neighbours)
         return false;
-    else if constexpr (K::form == Form::separable)
-        return !K::neighbours && sizeof(DeviceLane<K>) <= most;
     else
         return sizeof(DeviceLane<K>) <= most;
 }
@@ -209,7 +204,7 @@ template <class K>
 LOBATTO_INLINE void keep_state(DeviceLane<K>& lane) {
     if constexpr (K::events > 0)
         for (int c = 0; c < K::coordinates; ++c) {
-            lane.watched.q_before[c] = lane.motion.position(c);
+            lane.watched.q_before[c] = lane.motion.positions()[c];
             lane.watched.rate_before[c] = lane.motion.rates()[c];
         }
 }

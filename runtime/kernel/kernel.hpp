@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What emitted kernels stand on: Stepper<K>, the life in time of a kernel K. C++17, no allocation.
+// What emitted kernels stand on: Stepper<K> advances one trajectory of a kernel K. C++17; steps allocate nothing.
 #ifndef LOBATTO_KERNEL_HPP
 #define LOBATTO_KERNEL_HPP
 
@@ -22,17 +22,18 @@
 #include "base/spline.hpp"
 #include "base/trigonometry.hpp"
 #include "iteration/constrained_fixed_point.hpp"
+#include "iteration/constraint_checks.hpp"
 #include "iteration/convergence.hpp"
 #include "iteration/ensemble_fixed_point.hpp"
 #include "iteration/ensemble_tables.hpp"
 #include "iteration/extrapolation.hpp"
 #include "iteration/fixed_point.hpp"
 #include "iteration/galerkin.hpp"
-#include "iteration/galerkin_constraints.hpp"
 #include "iteration/galerkin_equations.hpp"
 #include "iteration/galerkin_newton.hpp"
 #include "iteration/galerkin_tables.hpp"
 #include "iteration/hamilton.hpp"
+#include "iteration/lane_state.hpp"
 #include "iteration/neighbours.hpp"
 #include "iteration/newton.hpp"
 #include "iteration/node_mass.hpp"
@@ -41,7 +42,6 @@
 #include "iteration/stage_equations.hpp"
 #include "iteration/stage_map.hpp"
 #include "iteration/tangent.hpp"
-#include "iteration/time_coordinate.hpp"
 #include "iteration/velocity_of_momentum.hpp"
 #include "steppers/clean.hpp"
 #include "steppers/clocked.hpp"
@@ -51,7 +51,6 @@
 #include "steppers/general.hpp"
 #include "steppers/hybrid_stepper.hpp"
 #include "steppers/inputs.hpp"
-#include "steppers/lent_steps.hpp"
 #include "steppers/linear.hpp"
 #include "steppers/refilled.hpp"
 #include "steppers/refraction.hpp"

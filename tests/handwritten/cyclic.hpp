@@ -13,7 +13,6 @@ struct HandwrittenPlane : HandwrittenKernel, Tables {
     using real = number;
     static constexpr int coordinates = 2;
     static constexpr Form form = Form::general;
-    static constexpr bool clocked = false;
     static constexpr bool autonomous = true;
     static constexpr int active = reduced ? 1 : 2, cyclic = reduced ? 1 : 0;
     static constexpr int active_index[2] = {0, 1}, cyclic_index[1] = {1};
@@ -23,8 +22,6 @@ struct HandwrittenPlane : HandwrittenKernel, Tables {
     static constexpr int entry_row[5] = {0, 1, 1, 2, 2};
     static constexpr int entry_column[5] = {0, 1, 2, 1, 2};
     static constexpr int mass_entries = 2, mass_row[2] = {0, 1}, mass_column[2] = {0, 1};
-    static constexpr bool constant_mass = false, hamiltonian = false;
-    static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {0}, constraint_column[1] = {0};
 };
 
 // The spherical pendulum, polar angle x, azimuth y: L = (x'^2 + sin(x)^2 y'^2)/2 + cos x, P = sin(x)^2 y',
@@ -33,7 +30,6 @@ template <class number, class Tables, bool reduced>
 struct HandwrittenSphericalPendulum : HandwrittenPlane<number, Tables, reduced> {
     using real = number;
     static constexpr const char* name = "handwritten_spherical_pendulum";
-    static constexpr bool linear = false;
     static constexpr int parameter_count = 0;
 
     struct Parameters {};

@@ -17,9 +17,8 @@ struct HandwrittenDoublePendulum : HandwrittenKernel, Tables {
     static constexpr int coordinates = 2;
     static constexpr int parameter_count = 0;
     static constexpr Form form = Form::general;
-    static constexpr bool clocked = false;
-    static constexpr bool autonomous = true, linear = false;
-    static constexpr int events = 2, stops = 0, impacts = 0, switches = 0;
+    static constexpr bool autonomous = true;
+    static constexpr int events = 2;
     static constexpr int event_direction[2] = {1, 0};
     static constexpr int active = 2, cyclic = 0;
     static constexpr int active_index[2] = {0, 1}, cyclic_index[1] = {0};
@@ -30,8 +29,6 @@ struct HandwrittenDoublePendulum : HandwrittenKernel, Tables {
     static constexpr int entry_row[16] = {0, 0, 1, 1, 0, 0, 1, 1, 2, 3, 2, 3, 2, 3, 2, 3};
     static constexpr int entry_column[16] = {0, 1, 0, 1, 2, 3, 2, 3, 0, 0, 1, 1, 2, 3, 3, 2};
     static constexpr int mass_entries = 4;
-    static constexpr bool constant_mass = false, hamiltonian = false;
-    static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {0}, constraint_column[1] = {0};
     static constexpr int mass_row[4] = {0, 0, 1, 1}, mass_column[4] = {0, 1, 0, 1};
 
     struct Parameters {};

@@ -18,7 +18,7 @@ struct HandwrittenDriven : HandwrittenKernel, Tables {
     using real = number;
     static constexpr const char* name = "handwritten_driven";
     static constexpr int coordinates = 1, parameter_count = 3;
-    static constexpr bool autonomous = false, linear = false;
+    static constexpr bool autonomous = false;
     static constexpr int position[1] = {0}, group_count = 1, group_first[2] = {0, 1}, group_bandwidth[1] = {0};
     using Parameters = DrivenParameters<number>;
     static real& parameter(Parameters& p, int i) { return i == 0 ? p.a : i == 1 ? p.w : p.d; }
@@ -34,12 +34,9 @@ struct HandwrittenDrivenGeneral : HandwrittenDriven<number, Tables> {
     using real = number;
     using Coefficients = DrivenParameters<number>;
     static constexpr Form form = Form::general;
-    static constexpr bool clocked = false;
     static constexpr int active = 1, cyclic = 0, active_index[1] = {0}, cyclic_index[1] = {0};
     static constexpr int entries = 3, entry_row[3] = {0, 1, 1}, entry_column[3] = {0, 1, 0};
     static constexpr int mass_entries = 1, mass_row[1] = {0}, mass_column[1] = {0};
-    static constexpr bool constant_mass = false, hamiltonian = false;
-    static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {0}, constraint_column[1] = {0};
 
     static void slope(const Coefficients& k, real time, const real* z, real* g) {
         g[0] = z[0];

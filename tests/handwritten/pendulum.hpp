@@ -17,7 +17,7 @@
 
 namespace lobatto {
 
-struct HandwrittenPendulum {
+struct HandwrittenPendulum : KernelDefaults {
     using real = double;
     static constexpr int coordinates = 1;
     static constexpr int points = 4;
@@ -26,10 +26,8 @@ struct HandwrittenPendulum {
     static constexpr int parameter_count = 2;
     static constexpr int entries = 1;  // S = V''/m has one entry
     static constexpr Form form = Form::separable;
-    static constexpr bool autonomous = true, linear = false, has_energy = true, has_tangent = true, absorbed = false;
-    static constexpr bool any_number = false, diagonal_part = false, clean = false, is_explicit = false,
-                          uses_hessian = true;
-    static constexpr int events = 0, angles = 0;
+    static constexpr bool autonomous = true, has_energy = true, has_tangent = true;
+    static constexpr bool any_number = false, uses_hessian = true;
     static constexpr const char* method = "Lobatto, 4 points";
     static constexpr const char* name = "handwritten_pendulum";
     static constexpr const char* digest = "0123456789abcdef";

@@ -136,12 +136,10 @@ template <class number>
 using SeparableGaussTwo = StaticSeparableTables<number, separable_gauss_values<number>, 4>;
 
 // What every kernel written by hand has.
-struct HandwrittenKernel {
+struct HandwrittenKernel : KernelDefaults {
     static constexpr const char* digest = "0123456789abcdef";
     static constexpr const char* method = "by hand";
-    static constexpr bool has_energy = true, has_tangent = true, any_number = false, diagonal_part = false,
-                          clean = false, is_explicit = false, uses_hessian = true, scaled_mass = false;
-    static constexpr int events = 0, angles = 0;
+    static constexpr bool has_energy = true, has_tangent = true, any_number = false, uses_hessian = true;
 };
 
 }  // namespace lobatto

@@ -2,7 +2,7 @@
 // What an emitted kernel K provides: static functions, the formulas of one scene, and constants (concept.hpp checks).
 //
 // Every kernel: real; name, digest, method; coordinates (n), order, parameter_count, Parameters, parameter();
-// Coefficients, prepare(); form; and these claims, all constexpr:
+// Coefficients, prepare(); form; and claims, all constexpr, of which KernelDefaults has those that rarely hold:
 //   autonomous   no formula depends on time; otherwise `real time` follows `k` in every function that takes `k` and q
 //   linear       the second derivatives are constant, so that one correction solves a step
 //   has_energy, has_tangent   whether energies and tangent maps are compiled
@@ -56,6 +56,18 @@ enum class Status : std::int32_t {
 // The same values as lobatto_form in abi.h.
 enum class Form : std::int32_t { linear_map = 0, separable = 1, general = 2 };
 
+// What a kernel claims by saying nothing: kernels inherit this, and declare what is otherwise.
+struct KernelDefaults {
+    static constexpr bool linear = false, clean = false, is_explicit = false, absorbed = false, diagonal_part = false;
+    static constexpr bool neighbours = false, immediate = false, unit_masses = false;
+    static constexpr bool clocked = false, has_time_coordinate = false, hamiltonian = false;
+    static constexpr bool constant_mass = false, scaled_mass = false, mass_needs_velocity = false;
+    static constexpr int events = 0, event_direction[1] = {}, stops = 0, impacts = 0, resets = 0, passages = 0;
+    static constexpr int switches = 0, refractions = 0, inputs = 0, first_input = 0, angles = 0, row_reach = -1;
+    static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {}, constraint_column[1] = {};
+    static constexpr int momentum_summand_count = 0;
+};
+
 // K's functions with a time for all of them: it is passed on where the kernel depends on it.
 #define LOBATTO_WITH_TIME(name)                                                                 \
     template <class Given, class Time, class... Rest>                                           \
@@ -79,9 +91,12 @@ struct Formulas {
     LOBATTO_WITH_TIME(event)
     LOBATTO_WITH_TIME(impact)
     LOBATTO_WITH_TIME(reset)
+    LOBATTO_WITH_TIME(refraction)
     LOBATTO_WITH_TIME(energy)
     LOBATTO_WITH_TIME(clock)
     LOBATTO_WITH_TIME(constraint)
+    LOBATTO_WITH_TIME(constraint_summands)
+    LOBATTO_WITH_TIME(momentum_summands)
     LOBATTO_WITH_TIME(multiplier_terms)
     // Along rows of coordinates, in the way How (base/rows.hpp).
     template <class How, class Given, class Time, class Position, class Slope>
@@ -99,45 +114,31 @@ struct Formulas {
 enum class Stepping { solved, clean, composition, clocked };
 template <class K>
 constexpr Stepping stepping_of() {
-    if constexpr (K::form == Form::separable)
-        return K::clean ? Stepping::clean : K::is_explicit ? Stepping::composition : Stepping::solved;
-    else if constexpr (K::form == Form::general)
-        return K::clocked ? Stepping::clocked : Stepping::solved;
-    else
-        return Stepping::solved;
-}
-template <class K>
-constexpr bool is_clean = stepping_of<K>() == Stepping::clean;
-template <class K>
-constexpr bool is_clocked = stepping_of<K>() == Stepping::clocked;
-
-// Systems with constant mass have none: what pulls on coordinates is of the general form.
-template <class K>
-constexpr int constraints_of() {
-    if constexpr (K::form == Form::general)
-        return K::constraints;
-    else
-        return 0;
-}
-
-// Whether a coordinate may move as soon as its acceleration is known.
-template <class K>
-constexpr bool moves_immediately() {
-    if constexpr (K::neighbours && stepping_of<K>() == Stepping::composition)
-        return K::immediate;
-    else
-        return false;
+    return K::clocked                                     ? Stepping::clocked
+           : K::clean                                     ? Stepping::clean
+           : K::form == Form::separable && K::is_explicit ? Stepping::composition
+                                                          : Stepping::solved;
 }
 
 // The most coordinates whose mass matrix is treated as a full one.
 constexpr int most_full = 16;
 
-// Zero when all are finite, not a number otherwise.
-template <class real>
-inline real not_finite_part(const real* x, int count) {
-    real sum = real(0);
+// Zero when all are finite, not a number otherwise; of Packs in each lane.
+template <class T>
+LOBATTO_DEVICE inline T not_finite_part(const T* x, int count) {
+    T sum = T(real_of<T>(0));
     for (int i = 0; i < count; ++i) sum += x[i] - x[i];
     return sum;
+}
+
+// A row of t, q[n], p[n]; of Packs, that of one lane.
+template <int n, class real, class Number>
+inline void put_state(real time, const Number* q, const Number* p, real* row, int lane = 0) {
+    row[0] = time;
+    for (int c = 0; c < n; ++c) {
+        row[1 + c] = lane_of(q[c], lane);
+        row[1 + n + c] = lane_of(p[c], lane);
+    }
 }
 
 // What the steppers of all forms carry.
@@ -195,8 +196,8 @@ template <class K, bool neighbours>
 struct FixedPointOf;
 
 // How the lanes of each form move by one step: start(single, lane) takes the state of a Stepper over, step(k, time,
-// active) moves the active lanes, and answers which have moved; position(c) and momentum(single, lane, p) read. What
-// all lanes of one step size share is read by shared(), and take(shared) sets it (device_lanes.hpp).
+// active) moves the active lanes, and answers which have moved; positions(), rates() and momentum(single, lane, p)
+// read. What all lanes of one step size share is read by shared(), and take(shared) sets it (device_lanes.hpp).
 template <class K, class T, Form form = K::form, Stepping stepping = stepping_of<K>()>
 struct LaneStepper;
 
@@ -270,11 +271,13 @@ struct Pause {
     }
 };
 
+// In place of what a kernel does not need.
+struct Nothing {};
+
 // Room for a step's arrays: on the stack while they are few, else in the stepper. In line, so that they are registers
 // where there are enough, and what the step refers to need not lie in memory for a call.
 template <class Arrays>
 struct Workspace {
-    struct Nothing {};
     static constexpr bool is_large = sizeof(Arrays) > 16384;
     mutable std::conditional_t<is_large, Arrays, Nothing> kept{};
 

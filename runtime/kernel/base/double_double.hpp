@@ -48,14 +48,7 @@ LOBATTO_INLINE constexpr T fused(const T& a, const T& b, const T& c) {
     return a * b + c;
 }
 
-// s + e = a + b, s the rounded sum (D. E. Knuth).
-template <class T>
-LOBATTO_INLINE constexpr void add(const T& a, const T& b, T& s, T& e) {
-    s = a + b;
-    const T part = s - a;
-    e = (a - (s - part)) + (b - part);
-}
-// The same where |a| >= |b|, or a is zero.
+// s + e = a + b, s the rounded sum, where |a| >= |b|, or a is zero.
 template <class T>
 LOBATTO_INLINE constexpr void add_smaller(const T& a, const T& b, T& s, T& e) {
     s = a + b;
@@ -89,17 +82,16 @@ LOBATTO_INLINE constexpr X joined(const T& high, const T& low) {
 template <class X>
 LOBATTO_INLINE constexpr X sum(const X& a, const X& b) {
     using T = typename X::Part;
-    T s{}, e{};
-    add(a.high, b.high, s, e);
+    T e{};
+    const T s = add_with_error(a.high, b.high, e);
     return joined<X>(s, e + (a.low + b.low));
 }
 // Errs by 3 u^2 |a + b|, also where digits cancel.
 template <class X>
 LOBATTO_INLINE constexpr X accurate_sum(const X& a, const X& b) {
     using T = typename X::Part;
-    T s{}, e{}, t{}, f{};
-    add(a.high, b.high, s, e);
-    add(a.low, b.low, t, f);
+    T e{}, f{};
+    const T s = add_with_error(a.high, b.high, e), t = add_with_error(a.low, b.low, f);
     const X first = joined<X>(s, e + t);
     return joined<X>(first.high, first.low + f);
 }
@@ -120,10 +112,10 @@ LOBATTO_INLINE constexpr X product_by_part(const X& a, const T& b) {
 template <class X>
 LOBATTO_INLINE constexpr X product_and_sum(const X& a, const X& b, const X& c) {
     using T = typename X::Part;
-    T p{}, e{}, s{}, f{};
+    T p{}, e{}, f{};
     multiply(a.high, b.high, p, e);
     const T rest = fused(a.high, b.low, fused(a.low, b.high, e + c.low));
-    add(c.high, p, s, f);
+    const T s = add_with_error(c.high, p, f);
     return joined<X>(s, f + rest);
 }
 template <class X>
@@ -350,7 +342,7 @@ LOBATTO_INLINE Pack<DoubleDouble, width> exact_sum(const Pack<double, width>& a,
     using X = Pack<DoubleDouble, width>;
     constexpr int count = X::count;
     X result;
-    LOBATTO_EACH(two_fold::add(a.part[i], b.part[i], result.part[i].high, result.part[i].low));
+    LOBATTO_EACH(result.part[i].high = add_with_error(a.part[i], b.part[i], result.part[i].low));
     return result;
 }
 template <int width>

@@ -310,8 +310,7 @@ struct Bits {
     }
 };
 
-// These two, like the functions of base/trigonometry.hpp and its kin, are also found by their full names lobatto::sqrt,
-// lobatto::fabs.
+// Templates outside Pack, like the functions of base/trigonometry.hpp, so that lobatto::sqrt(x) finds them.
 template <class real, int width>
 LOBATTO_INLINE Pack<real, width> sqrt(const Pack<real, width>& a) {
     using Numbers = Pack<real, width>;
@@ -329,6 +328,14 @@ LOBATTO_INLINE Pack<real, width> fabs(const Pack<real, width>& a) {
 template <class A, class B, class C>
 LOBATTO_INLINE auto fused_sum(const A& a, const B& b, const C& c) {
     return fused(a, b, c);
+}
+
+// a + b = sum + error, for any sizes of a and b (D. E. Knuth).
+template <class T>
+LOBATTO_INLINE constexpr T add_with_error(const T& a, const T& b, T& error) {
+    const T sum = a + b, of_b = sum - a;
+    error = (a - (sum - of_b)) + (b - of_b);
+    return sum;
 }
 
 // How many lanes a type has, and of which number.

@@ -311,7 +311,7 @@ private:
     }
 };
 
-// How an emitted kernel goes through its rows: one after another, for any type of number,
+// An emitted kernel goes through its rows in one of these ways. One after another, for any type of number.
 struct OneByOne {
     template <int count, class number>
     static void clear(number* W) {
@@ -345,8 +345,8 @@ struct OneByOne {
     }
 };
 
-// or the same where each entry of W is given away as soon as it is known, with its coordinate no longer needed
-// (K::immediate); masses are the receiver's,
+// The same, but each entry of W is given away as soon as it is known, with its coordinate no longer needed
+// (K::immediate); masses are the receiver's.
 struct Immediate {
     template <int count, int variables, const auto& indices, const auto& runs, int fixed_ends = free_ends, class number,
               class Receiver, class Formula>
@@ -358,7 +358,7 @@ struct Immediate {
     LOBATTO_INLINE static void scale(Receiver, const Factor*) {}
 };
 
-// or those of a run side by side in a Pack:
+// Those of a run side by side in a Pack; what the next two share.
 struct InLanes {
     template <class real>
     using NativePack = Pack<real, native_lanes<real>>;
@@ -384,7 +384,7 @@ struct InLanes {
     }
 };
 
-// for plain numbers in arrays with room,
+// Side by side, of plain numbers in arrays with room.
 struct SideBySide : InLanes {
     template <int count, class real>
     LOBATTO_INLINE static void clear(real* W) {
@@ -413,7 +413,7 @@ struct SideBySide : InLanes {
     }
 };
 
-// or in registers, all written out.
+// Side by side in registers, all written out.
 struct WrittenOut : InLanes {
     template <int count, class V, int parts>
     LOBATTO_INLINE static void clear(Registers<V, parts> W) {

@@ -18,20 +18,18 @@ struct Advance {
 
     static real* out(void* numbers) { return static_cast<real*>(numbers); }
 
-    struct NoWatch {};
     static void count(const S& stepper, lobatto_advance& call) {
         if constexpr (S::N > 0) {
             call.iterations += stepper.iterations;
-            if (stepper.iterations > call.iterations_most) call.iterations_most = stepper.iterations;
-            if (static_cast<double>(stepper.increment) > call.increment_largest)
-                call.increment_largest = static_cast<double>(stepper.increment);
+            call.iterations_most = maximum(stepper.iterations, call.iterations_most);
+            call.increment_largest = maximum(static_cast<double>(stepper.increment), call.increment_largest);
         }
     }
 
     // Arrivals at equally spaced times, of a stepper with a clock. What does not fit into one call goes on in the next.
     template <class AnyWatch>
     static Status take_intervals(S& stepper, lobatto_advance& call, AnyWatch* watch) {
-        constexpr bool is_watched = !std::is_same_v<AnyWatch, NoWatch>;
+        constexpr bool is_watched = !std::is_same_v<AnyWatch, Nothing>;
         constexpr std::int64_t most = 65536;  // steps of the chain in one call
         stepper.tolerance = static_cast<real>(call.tolerance);
         const real end = static_cast<real>(call.end), interval = static_cast<real>(call.interval);
@@ -83,21 +81,14 @@ struct Advance {
         return stops_beyond ? Status::ok : status;
     }
     static void put_row(real time, const real* q, const real* p, lobatto_advance& call) {
-        put_state(time, q, p, next_row(call));
-    }
-    static void put_state(real time, const real* q, const real* p, real* row) {
-        row[0] = time;
-        for (int k = 0; k < n; ++k) {
-            row[1 + k] = q[k];
-            row[1 + n + k] = p[k];
-        }
+        put_state<n>(time, q, p, next_row(call));
     }
 
     template <class AnyWatch>
     static Status take_steps(S& stepper, lobatto_advance& call, AnyWatch* watch) {
-        if constexpr (is_clocked<K>) {
+        if constexpr (K::clocked) {
             const Status status = take_intervals(stepper, call, watch);
-            if (call.chain != nullptr) put_state(stepper.now.time, stepper.q, stepper.p, out(call.chain));
+            if (call.chain != nullptr) put_state<n>(stepper.now.time, stepper.q, stepper.p, out(call.chain));
             return status;
         } else {
             return take_equal_steps(stepper, call, watch);
@@ -105,7 +96,7 @@ struct Advance {
     }
     template <class AnyWatch>
     static Status take_equal_steps(S& stepper, lobatto_advance& call, AnyWatch* watch) {
-        constexpr bool is_watched = !std::is_same_v<AnyWatch, NoWatch>;
+        constexpr bool is_watched = !std::is_same_v<AnyWatch, Nothing>;
         stepper.tolerance = static_cast<real>(call.tolerance);
         std::int64_t until_record = call.record_every > 0 ? call.record_every - stepper.steps % call.record_every : -1;
         for (std::int64_t i = 0; i < call.steps; ++i) {
@@ -136,10 +127,9 @@ struct Advance {
                     for (std::int32_t d = 1; d <= call.dense; ++d)
                         Between<K>::row(stepper, real(d) / real(call.dense + 1), next_row(call));
                 }
-                real* const row = next_row(call);
-                row[0] = stepper.time();
-                for (int k = 0; k < n; ++k) row[1 + k] = stepper.q[k];
-                stepper.momentum(row + 1 + n);
+                real p[n];
+                stepper.momentum(p);
+                put_row(stepper.time(), stepper.q, p, call);
                 until_record = call.record_every;
             }
         }

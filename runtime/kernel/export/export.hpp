@@ -13,16 +13,6 @@
 
 namespace lobatto {
 
-// How many inputs K has; without any it says nothing of them.
-template <class K, class = void>
-struct InputsOf {
-    static constexpr int count = 0;
-};
-template <class K>
-struct InputsOf<K, std::void_t<decltype(K::inputs)>> {
-    static constexpr int count = K::inputs;
-};
-
 // The functions of one trajectory, and those of E.
 template <class K, class E = NoEnsemble>
 struct Export {
@@ -30,10 +20,10 @@ struct Export {
     // Beside lanes, which have functions of their own, a single trajectory takes steps and does no more.
     static constexpr bool is_whole = E::lanes == 0;
     static constexpr int n = K::coordinates, event_count = is_whole ? K::events : 0;
-    static constexpr int constraint_count = constraints_of<K>();
-    static constexpr int inputs = is_whole ? InputsOf<K>::count : 0;
-    static constexpr bool has_switches = is_whole && switches_of<K>() > 0;
-    static constexpr bool has_walls = has_switches || (is_whole && impacts_of<K>() > 0);
+    static constexpr int constraint_count = K::constraints;
+    static constexpr int inputs = is_whole ? K::inputs : 0;
+    static constexpr bool has_switches = is_whole && K::switches > 0;
+    static constexpr bool has_walls = has_switches || (is_whole && K::impacts > 0);
     static constexpr bool has_dense = is_whole && K::form != Form::linear_map, has_tangent = is_whole && K::has_tangent;
     using S = std::conditional_t<(event_count > 0), WatchedStepper<K>, Stepper<K>>;
     using Taken = Advance<K, S, has_dense>;
@@ -127,11 +117,11 @@ struct Export {
                 return Taken::take_steps(stepper, call, &watch);
             }
         }
-        return Taken::take_steps(stepper, call, static_cast<typename Taken::NoWatch*>(nullptr));
+        return Taken::take_steps(stepper, call, static_cast<Nothing*>(nullptr));
     }
 
     static void state(const void* stepper, void* time, void* q, void* p) {
-        if constexpr (is_clocked<K>) {
+        if constexpr (K::clocked) {
             *out(time) = of(stepper).arrival_time;
             for (int k = 0; k < n; ++k) {
                 out(q)[k] = of(stepper).arrival_q[k];
@@ -145,7 +135,7 @@ struct Export {
     }
 
     static void read_two_fold(const void* stepper, void* q, void* q_rest, void* velocity, void* velocity_rest) {
-        if constexpr (is_clean<K>) {
+        if constexpr (K::clean) {
             for (int k = 0; k < n; ++k) {
                 out(q)[k] = of(stepper).q[k];
                 out(q_rest)[k] = of(stepper).q_rest[k];
@@ -154,7 +144,7 @@ struct Export {
             }
         }
     }
-    static constexpr auto two_fold_state = is_clean<K> ? read_two_fold : nullptr;
+    static constexpr auto two_fold_state = K::clean ? read_two_fold : nullptr;
 
     static std::int32_t dense(const void* stepper, const void* theta, void* q, void* velocity) {
         if constexpr (has_dense) {
@@ -250,12 +240,6 @@ struct Export {
                : Limits<real>::epsilon > real(1e-25L) ? LOBATTO_LONG_DOUBLE
                                                       : LOBATTO_FLOAT128;
     }
-    static constexpr std::int32_t first_input() {
-        if constexpr (inputs > 0)
-            return K::first_input;
-        else
-            return 0;
-    }
     static constexpr std::int32_t events_of_step() {
         if constexpr (event_count > 0)
             return Watch<K>::most;
@@ -263,77 +247,82 @@ struct Export {
             return E::events_of_step;
     }
 
-    static constexpr lobatto_kernel table = {LOBATTO_ABI_VERSION,
-                                             sizeof(lobatto_kernel),
-                                             K::name,
-                                             K::digest,
-                                             K::method,
-                                             kind(),
-                                             sizeof(real),
-                                             parts,
-                                             static_cast<double>(Limits<real>::epsilon),
-                                             static_cast<std::int32_t>(K::form),
-                                             n,
-                                             K::parameter_count,
-                                             inputs,
-                                             first_input(),
-                                             S::nodes,
-                                             K::order,
-                                             S::N,
-                                             K::autonomous ? 1 : 0,
-                                             is_clocked<K> ? 1 : 0,
-                                             K::linear ? 1 : 0,
-                                             constraint_count,
-                                             K::has_energy ? 1 : 0,
-                                             has_tangent ? 1 : 0,
-                                             has_dense ? 1 : 0,
-                                             event_count,
-                                             is_whole ? stops_of<K>() : 0,
-                                             is_whole ? impacts_of<K>() : 0,
-                                             events_of_step(),
-                                             sizeof(S),
-                                             alignof(S),
-                                             prepare,
-                                             start,
-                                             go_on,
-                                             advance,
-                                             state,
-                                             inputs_taken,
-                                             two_fold_state,
-                                             dense,
-                                             to_parts,
-                                             from_parts,
-                                             energy,
-                                             momentum,
-                                             velocity,
-                                             slopes,
-                                             constraint,
-                                             find_multipliers,
-                                             residual,
-                                             jacobian,
-                                             tangent,
-                                             E::lanes,
-                                             E::bytes,
-                                             E::alignment,
-                                             E::prepare,
-                                             E::start,
-                                             E::advance,
-                                             E::state,
-                                             K::has_energy ? E::energy : nullptr,
-                                             E::refilled_prepare,
-                                             E::fill,
-                                             E::refilled_advance};
+    static constexpr lobatto_kernel filled_table() {
+        lobatto_kernel t{};
+        t.abi_version = LOBATTO_ABI_VERSION;
+        t.bytes = sizeof(lobatto_kernel);
+        t.name = K::name;
+        t.digest = K::digest;
+        t.method = K::method;
+        t.real_kind = kind();
+        t.real_bytes = sizeof(real);
+        t.parts = parts;
+        t.epsilon = static_cast<double>(Limits<real>::epsilon);
+        t.form = static_cast<std::int32_t>(K::form);
+        t.coordinates = n;
+        t.parameters = K::parameter_count;
+        t.inputs = inputs;
+        t.first_input = is_whole ? K::first_input : 0;
+        t.nodes = S::nodes;
+        t.order = K::order;
+        t.unknowns = S::N;
+        t.autonomous = K::autonomous;
+        t.clocked = K::clocked;
+        t.linear = K::linear;
+        t.constraints = constraint_count;
+        t.has_energy = K::has_energy;
+        t.has_tangent = has_tangent;
+        t.has_dense = has_dense;
+        t.events = event_count;
+        t.stops = is_whole ? K::stops : 0;
+        t.impacts = is_whole ? K::impacts : 0;
+        t.events_of_step = events_of_step();
+        t.stepper_bytes = sizeof(S);
+        t.stepper_alignment = alignof(S);
+        t.prepare = prepare;
+        t.start = start;
+        t.go_on = go_on;
+        t.advance = advance;
+        t.state = state;
+        t.set_inputs = inputs_taken;
+        t.two_fold_state = two_fold_state;
+        t.dense = dense;
+        t.to_parts = to_parts;
+        t.from_parts = from_parts;
+        t.energy = energy;
+        t.momentum = momentum;
+        t.velocity = velocity;
+        t.slopes = slopes;
+        t.constraint = constraint;
+        t.multipliers = find_multipliers;
+        t.residual = residual;
+        t.jacobian = jacobian;
+        t.tangent = tangent;
+        t.lanes = E::lanes;
+        t.ensemble_bytes = E::bytes;
+        t.ensemble_alignment = E::alignment;
+        t.ensemble_prepare = E::prepare;
+        t.ensemble_start = E::start;
+        t.ensemble_advance = E::advance;
+        t.ensemble_state = E::state;
+        t.ensemble_energy = K::has_energy ? E::energy : nullptr;
+        t.refilled_prepare = E::refilled_prepare;
+        t.refilled_fill = E::fill;
+        t.refilled_advance = E::refilled_advance;
+        return t;
+    }
+    static constexpr lobatto_kernel table = filled_table();
 };
 
 // With LOBATTO_ENSEMBLES, a library for that many trajectories or more: side by side, where that is faster, and where
 // none meets a wall or, without LOBATTO_REFILLED, ends before the others.
 #if defined(LOBATTO_REFILLED)
-template <class K, int lanes = (impacts_of<K>() + switches_of<K>() > 0) ? 0 : refilled_lanes<K>(LOBATTO_ENSEMBLES)>
+template <class K, int lanes = (K::impacts + K::switches > 0) ? 0 : refilled_lanes<K>(LOBATTO_ENSEMBLES)>
 using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportRefilled<K, lanes>>, Export<K>>;
 #elif defined(LOBATTO_ENSEMBLES)
-template <class K, int lanes = (stops_of<K>() + impacts_of<K>() + switches_of<K>() > 0) ? 0
-                               : is_clocked<K>                                          ? clocked_lanes<K>()
-                                               : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
+template <class K, int lanes = (K::stops + K::impacts + K::switches > 0) ? 0
+                               : K::clocked                              ? clocked_lanes<K>()
+                                                                         : ensemble_lanes<K>(LOBATTO_ENSEMBLES)>
 using Exported = std::conditional_t<(lanes > 0), Export<FallbackKernel<K>, ExportSide<K, lanes>>, Export<K>>;
 #else
 template <class K>

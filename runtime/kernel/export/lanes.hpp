@@ -63,6 +63,7 @@ template <class K, class Side>
 struct ExportLanes : NoEnsemble {
     using real = typename K::real;
     static constexpr std::int32_t lanes = Side::lanes, bytes = sizeof(Side), alignment = alignof(Side);
+    static constexpr std::int32_t events_of_step = Side::events_of_step;
 
     static void refilled_prepare(void* ensemble, const void* step) {
         (new (ensemble) Side)->prepare(*static_cast<const real*>(step));
@@ -73,36 +74,17 @@ struct ExportLanes : NoEnsemble {
             lane, static_cast<const real*>(parameters), *static_cast<const real*>(time), static_cast<const real*>(q),
             static_cast<const real*>(p)));
     }
-};
-
-template <class K, int width>
-struct ExportClocked : ExportLanes<K, ClockedEnsemble<K, width>> {
     static void refilled_advance(void* ensemble, lobatto_refilled_advance* call) {
-        ExportEnsemble<K, width>::with(call->status, [&](Status* status) {
-            static_cast<ClockedEnsemble<K, width>*>(ensemble)->advance(*call, status);
-        });
+        ExportEnsemble<K, lanes>::with(call->status,
+                                       [&](Status* status) { static_cast<Side*>(ensemble)->advance(*call, status); });
     }
 };
 
 template <class K, int width>
-using ExportSide = std::conditional_t<is_clocked<K>, ExportClocked<K, width>, ExportEnsemble<K, width>>;
-
+using ExportSide = std::conditional_t<K::clocked, ExportLanes<K, ClockedEnsemble<K, width>>, ExportEnsemble<K, width>>;
 #ifdef LOBATTO_REFILLED
 template <class K, int width>
-struct ExportRefilled : ExportLanes<K, RefilledEnsemble<K, width>> {
-    using real = typename K::real;
-    using Side = RefilledEnsemble<K, width>;
-    static constexpr std::int32_t events_of_step = Side::Looks::most;
-
-    static void refilled_advance(void* ensemble, lobatto_refilled_advance* call) {
-        ExportEnsemble<K, width>::with(call->status, [&](Status* status) {
-            static_cast<Side*>(ensemble)->advance(call->steps, static_cast<real>(call->tolerance),
-                                                  static_cast<real*>(call->records), call->capacity,
-                                                  static_cast<real*>(call->events), call->event_capacity, status,
-                                                  call->steps_done, call->iterations, call->events_written);
-        });
-    }
-};
+using ExportRefilled = ExportLanes<K, RefilledEnsemble<K, width>>;
 #endif
 #endif
 

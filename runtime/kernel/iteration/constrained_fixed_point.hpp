@@ -18,6 +18,7 @@
 #include "constraint_rounding.hpp"
 #include "convergence.hpp"
 #include "extrapolation.hpp"
+#include "node_mass.hpp"
 #include "stage_map.hpp"
 
 namespace lobatto {
@@ -31,12 +32,6 @@ struct ConstrainedFixedPoint {
     using Layout = NodeLayout<real, real, m - 1, node_lanes<real>>;
     using V = typename Layout::V;
     static constexpr int width = Layout::width, parts = Layout::parts_of(m), lanes = parts * width;
-
-    static constexpr bool is_diagonal() {
-        for (int e = 0; e < K::mass_entries; ++e)
-            if (K::mass_row[e] != K::mass_column[e]) return false;
-        return true;
-    }
 
     struct Arrays {
         V Q[parts * n], f[parts * n], phi[parts * constraints], phi_t[parts * constraints], G[parts * slopes],
@@ -100,15 +95,10 @@ struct ConstrainedFixedPoint {
         usable = solve<n, n>(mass, inverse_mass) && usable;
     }
 
-    void begin(const real*) { has_history = false; }
-    template <class Velocity>
-    void recall(const Velocity&) {
-        has_history = false;
-    }
     real displacement(int c, int j) const { return Y[c * m + j]; }
 
     // One step, h from `time`; false: it was not solved, and nothing has changed.
-    bool step(const Coefficients& k, real time, real* q, real* p, bool) {
+    bool step(const Coefficients& k, real time, real* q, real* p) {
         return usable && workspace.with([&](Arrays& a) { return solve_step(k, time, q, p, a); });
     }
 
@@ -118,7 +108,7 @@ private:
     LOBATTO_INLINE void divide_by_mass(const T* y, T* x) const {
         for (int c = 0; c < n; ++c) {
             x[c] = T(inverse_mass[c * n + c]) * y[c];
-            if constexpr (!is_diagonal())
+            if constexpr (!has_diagonal_mass<K>())
                 for (int l = 0; l < n; ++l)
                     if (l != c) x[c] = fused(T(inverse_mass[c * n + l]), y[l], x[c]);
         }
@@ -317,7 +307,7 @@ private:
     bool finish(const Coefficients& k, real time, real* q, real* p, real* multipliers, Arrays& a) {
         evaluate(k, time, a);
         if (!keeps_constraints(a)) return false;
-        real q1[n], p1[n], G1[slopes], mu[constraints], not_finite = real(0);
+        real q1[n], p1[n], G1[slopes], mu[constraints];
         real pull[constraints];
         for (int c = 0; c < constraints; ++c) pull[c] = multipliers[c * s];
         real y[n];
@@ -332,10 +322,9 @@ private:
             for (int part = 1; part < parts; ++part) total = fused(weight[part], a.f[part * n + c], total);
             q1[c] = a.Q[(last / width) * n + c][last % width];
             p1[c] = p[c] + (h * K::b[0] * y[c] + sum(total));
-            not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
         }
         for (int e = 0; e < slopes; ++e) G1[e] = a.G[(last / width) * slopes + e][last % width];
-        if (not_finite != real(0) || !factor(G1, a.B, a.pivots)) return false;
+        if (!is_finite(not_finite_part(q1, n) + not_finite_part(p1, n)) || !factor(G1, a.B, a.pivots)) return false;
         for (int c = 0; c < constraints; ++c) multipliers[c * s + m] = real(0);
         for (int look = 0; look < 2; ++look) {  // the second takes the rounding of the first away
             real v1[n];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// When an iteration ends: the convergence rules of all of them.
+// When an iteration ends: the rules that iterations share.
 //
 // An increment e is the size of what an iteration moves positions by, relative to their measure; e_before is the one
 // before it. Increments below `enough` are rounding, or the tolerance that was asked for.

@@ -17,6 +17,7 @@
 #include "../base/pack.hpp"
 #include "convergence.hpp"
 #include "ensemble_tables.hpp"
+#include "lane_state.hpp"
 
 namespace lobatto {
 
@@ -354,12 +355,12 @@ private:
 };
 
 template <class K, class T>
-struct LaneStepper<K, T, Form::separable, Stepping::solved> {
-    using real = typename K::real;
-    using ActiveMask = decltype(T() < T());
-    static constexpr int n = K::coordinates;
+struct LaneStepper<K, T, Form::separable, Stepping::solved> : LaneState<K, T, true> {
+    using State = LaneState<K, T, true>;
+    using State::n, State::q, State::rate;
+    using typename State::real, typename State::ActiveMask;
     using Shared = typename EnsembleTables<K, T>::Shared;
-    T q[n], u[n], evaluations = T(real(0));
+    static constexpr int s = K::points, m = s - 2;
     EnsembleFixedPoint<K, T> fixed_point;
 
     Shared shared() const { return fixed_point.shared(); }
@@ -368,42 +369,67 @@ struct LaneStepper<K, T, Form::separable, Stepping::solved> {
         fixed_point.template take<alike>(all);
     }
 
-    LOBATTO_DEVICE const T& position(int c) const { return q[c]; }
-    LOBATTO_DEVICE const T* rates() const { return u; }
     void prepare(const ScalarFallback<K>& single, int lane) {
         fixed_point.prepare(single.coefficients, single.step_size, lane);
     }
     void set_tolerance(real tolerance) { fixed_point.set_tolerance(tolerance); }
     void start(const ScalarFallback<K>& single, int lane) {
-        follow_state(single, lane);
-        fixed_point.begin(single.q, single.u, single.W + (K::points - 1) * n, lane);
+        this->follow_state(single, lane);
+        fixed_point.begin(single.q, single.u, single.W + (s - 1) * n, lane);
     }
-    void momentum(const ScalarFallback<K>& single, int lane, real* momentum) const {
-        real velocity[n];
-        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[c], lane);
-        K::momentum(single.coefficients, velocity, momentum);
+    // A trajectory that begins in the midst of others has a memory as they do: of a constant acceleration.
+    void refill(const ScalarFallback<K>& single, int lane) {
+        start(single, lane);
+        const real* const W0 = single.W + (s - 1) * n;
+        fixed_point.recall(
+            single.u, [&](int, int c) { return W0[c]; }, [&](int, int c) { return single.q[c]; }, lane);
     }
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
-        const ActiveMask moved = fixed_point.step(k, time, q, u, active);
-        evaluations = fixed_point.evaluations;
+        const ActiveMask moved = fixed_point.step(k, time, q[0], rate[0], active);
+        this->evaluations = fixed_point.evaluations;
         return moved;
     }
     // Takes over the state and the memory of the step that `single` has taken.
     void follow(const ScalarFallback<K>& single, int lane) {
-        follow_state(single, lane);
+        this->follow_state(single, lane);
         fixed_point.recall(
             single.u, [&](int i, int c) { return single.node_minus_acceleration(i, c); },
             [&](int i, int c) { return single.node_position(i, c); }, lane);
     }
 
-private:
-    void follow_state(const ScalarFallback<K>& single, int lane) {
+    template <class Given>
+    LOBATTO_LANE void displacements(const Given&, const T&, const T* q_before, const T* u_before, T (*moved)[n]) const {
+        static constexpr Table table{};
+        const real h = fixed_point.h;
         for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(u[c], lane, single.u[c]);
+            const T* const W = fixed_point.w + c * s;
+            const T drift = fused(T(-h * K::b[0]), W[0], u_before[c]);
+            moved[0][c] = T(real(0));
+            for (int i = 0; i < m; ++i) {
+                T sum = T(table.c[i + 1]) * drift;
+                for (int j = 0; j < m; ++j) sum = fused(T(-h * table.A[i * m + j]), W[j + 1], sum);
+                moved[i + 1][c] = T(h) * sum;
+            }
+            moved[s - 1][c] = q[0][c] - q_before[c];
         }
     }
+    template <class Single>
+    void lend_step(const T (*)[n], Single& single, int lane) const {
+        this->lend_end(single, lane);
+        for (int i = 0; i < s; ++i)
+            for (int c = 0; c < n; ++c) single.W[i * n + c] = lane_of(fixed_point.minus_acceleration(i, c), lane);
+        single.is_current = true;
+    }
+
+private:
+    struct Table {  // of K, for indices that are no constants: a device has no address of K's own
+        real c[s]{}, A[m > 0 ? m*m : 1]{};
+        constexpr Table() {
+            for (int i = 0; i < s; ++i) c[i] = K::c[i];
+            for (int i = 0; i < m * m; ++i) A[i] = K::A[i];
+        }
+    };
 };
 
 }  // namespace lobatto

@@ -30,7 +30,7 @@ struct EnsembleTables : StageMap<K, T> {
     // those with the same parameters.
     struct Shared {
         typename Tables::Map map[maps];
-        std::conditional_t<absorbs, T[n], Unit> diagonal;
+        std::conditional_t<absorbs, T[n], Nothing> diagonal;
         T reach;
         T node_time[parts], weight[parts], arrival[parts];
         real h;

@@ -4,8 +4,8 @@
 // With V, P = dL/dv and F = dL/dq + forces at the r nodes, A the matrix that integrates over the node polynomials,
 // A'_ij = b_j (1 - A_ji / b_i), and pi the Legendre polynomial of degree r - 1 for Lobatto's nodes, nothing for
 // Gauss's, the Galerkin equations (D28) are (D35)
-//     Q_i = q + h sum_j A_ij V_j,   P_i = p + h sum_j A'_ij F_j + kappa pi_i,   P_i = L_v(Q_i, V_i),   sum_i b_i pi_i
-//     V_i = 0 q1 = q + h sum_j b_j V_j,     p1 = p + h sum_j b_j F_j
+//     Q_i = q + h sum_j A_ij V_j,   P_i = p + h sum_j A'_ij F_j + kappa pi_i,   P_i = L_v(Q_i, V_i),
+//     q1 = q + h sum_j b_j V_j,     p1 = p + h sum_j b_j F_j,                   sum_i b_i pi_i V_i = 0
 // An iteration takes F, L_v and M = L_vv at all nodes, then P, then V <- V + M^-1 (P - L_v) with the kappa that keeps
 // the last sum zero, then Q: where M varies little it contracts like h^2, not like h, because Q is new in every
 // iteration. Angles are taken from those at the start of the step (base/angles.hpp). Where velocities are formulas of
@@ -22,8 +22,8 @@
 #include "convergence.hpp"
 #include "galerkin_tables.hpp"
 #include "hamilton.hpp"
+#include "lane_state.hpp"
 #include "node_mass.hpp"
-#include "time_coordinate.hpp"
 
 #ifdef __clang__  // which warns of loops that are too large to unroll, in mechanisms
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -76,7 +76,7 @@ struct GalerkinFixedPoint : GalerkinTables<K, T> {
     // One step of the lanes that are `active`, h from `time`, one number or one a lane. The lanes that the answer names
     // have moved; the others stay.
     template <class Given, class Time>
-    LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, T* q, T* p, ActiveMask active) {
+    LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, T* q, T* p, ActiveMask active = ActiveMask(true)) {
         return workspace.with([&](Arrays& a) { return step_in(k, time, q, p, active, a); });
     }
 
@@ -276,39 +276,14 @@ private:
             return fabs(worst);
     }
 
-    // The same for masses that do not couple coordinates, or do so by M0 alone, which drops out: kappa = M0 d is found
-    // anew, and P does not hold it.
-    LOBATTO_INLINE void correct_each(T* kappa_now, Arrays& a) {
-        V weighted[parts], moved[parts * mass_room];  // h b pi, M^-1 pi
-        T share[mass_room], d[n];
-        for (int part = 0; part < parts; ++part) weighted[part] = weight[part] * legendre[part];
-#pragma GCC unroll 8
-        for (int c = 0; c < mass_room; ++c) {
-            for (int part = 0; part < parts; ++part)
-                moved[part * mass_room + c] = legendre[part] * a.M[part * mass_room + c];
-            share[c] = T(real(-1)) / over_nodes(weighted, moved + c, mass_room);
-        }
-#pragma GCC unroll 8
-        for (int c = 0; c < n; ++c) {
-            const int of = c < mass_room ? c : 0;
-            d[c] = share[of] * over_nodes(weighted, a.Lv + c, n);
-            for (int part = 0; part < parts; ++part) {
-                V& x = a.Lv[part * n + c];
-                x = fused(moved[part * mass_room + of], V(d[c]), x);
-            }
-        }
-        mass.momentum_of(d, kappa_now);
-    }
-
     // kappa <- kappa + d, V <- V + M^-1 pi d with sum b pi V = 0.
     LOBATTO_INLINE void correct(T* kappa_now, Arrays& a) {
         V weighted[parts];  // h b pi
 #pragma GCC unroll 8
         for (int part = 0; part < parts; ++part) weighted[part] = weight[part] * legendre[part];
-        T S[n * n], d[n];
+        T S[n * n], d[n];  // S = sum h b pi^2 M^-1, column by column
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) d[c] = -over_nodes(weighted, a.Lv + c, n);
-            // S = sum h b pi^2 M^-1, column by column.
 #pragma GCC unroll 8
         for (int c = 0; c < n; ++c) {
             V columns[parts * n];
@@ -336,6 +311,30 @@ private:
         for (int c = 0; c < n; ++c) kappa_now[c] += d[c];
     }
 
+    // The same for masses that do not couple coordinates, or do so by M0 alone, which drops out: kappa = M0 d is found
+    // anew, and P does not hold it.
+    LOBATTO_INLINE void correct_each(T* kappa_now, Arrays& a) {
+        V weighted[parts], moved[parts * mass_room];  // h b pi, M^-1 pi
+        T share[mass_room], d[n];
+        for (int part = 0; part < parts; ++part) weighted[part] = weight[part] * legendre[part];
+#pragma GCC unroll 8
+        for (int c = 0; c < mass_room; ++c) {
+            for (int part = 0; part < parts; ++part)
+                moved[part * mass_room + c] = legendre[part] * a.M[part * mass_room + c];
+            share[c] = T(real(-1)) / over_nodes(weighted, moved + c, mass_room);
+        }
+#pragma GCC unroll 8
+        for (int c = 0; c < n; ++c) {
+            const int of = c < mass_room ? c : 0;
+            d[c] = share[of] * over_nodes(weighted, a.Lv + c, n);
+            for (int part = 0; part < parts; ++part) {
+                V& x = a.Lv[part * n + c];
+                x = fused(moved[part * mass_room + of], V(d[c]), x);
+            }
+        }
+        mass.momentum_of(d, kappa_now);
+    }
+
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask finish(const Given& k, [[maybe_unused]] const Time& time, T* q, T* p, const T* kappa_now,
                                    ActiveMask done, Arrays& a) {
@@ -349,8 +348,8 @@ private:
         if constexpr (K::clocked) {
             V rate[parts];
             for (int part = 0; part < parts; ++part)
-                rate[part] = HasTimeCoordinate<K>::value ? a.v[part * n + n - 1]
-                                                         : Formulas<K>::clock(k, V(time), a.Q + part * n);
+                rate[part] =
+                    K::has_time_coordinate ? a.v[part * n + n - 1] : Formulas<K>::clock(k, V(time), a.Q + part * n);
             const T passed = over_nodes(weight, rate, 1);
             not_finite += passed - passed;
             elapsed = select(done, passed, elapsed);
@@ -374,13 +373,13 @@ private:
 };
 
 template <class K, class T, Stepping stepping>
-struct LaneStepper<K, T, Form::general, stepping> {
-    using real = typename K::real;
+struct LaneStepper<K, T, Form::general, stepping> : LaneState<K, T, false> {
+    using State = LaneState<K, T, false>;
+    using State::n, State::q, State::rate;
+    using typename State::real, typename State::ActiveMask;
     using Chain = Stepper<FallbackKernel<K>, Form::general, Stepping::solved>;
-    using ActiveMask = decltype(T() < T());
-    static constexpr int n = K::coordinates;
     using Shared = GalerkinTables<K, T>;
-    T q[n], p[n], evaluations = T(real(0));
+    static constexpr int r = K::nodes, controls = K::controls - 1;
     GalerkinFixedPoint<K, T> fixed_point;
 
     Shared shared() const { return fixed_point; }
@@ -389,42 +388,96 @@ struct LaneStepper<K, T, Form::general, stepping> {
         static_cast<Shared&>(fixed_point) = all;
     }
 
-    LOBATTO_DEVICE const T& position(int c) const { return q[c]; }
-    LOBATTO_DEVICE const T* rates() const { return p; }
     void prepare(const ScalarFallback<K>& single, int) { fixed_point.prepare(single.step_size); }
     void set_tolerance(real tolerance) { fixed_point.tolerance = tolerance; }
     void start(const ScalarFallback<K>& single, int lane) {
-        follow_state(single, lane);
+        this->follow_state(single, lane);
         real velocity[n] = {};
         const Chain& chain = single;  // with a clock: dq/dtau
         chain.velocity(chain.time(), single.q, single.p, velocity);
         fixed_point.begin(chain.coefficients, chain.time(), single.q, velocity, lane);
     }
-    void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
-        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
-    }
+    void refill(const ScalarFallback<K>& single, int lane) { start(single, lane); }
     template <class Given, class Time>
     LOBATTO_APART ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
-        const ActiveMask moved = fixed_point.step(k, time, q, p, active);
-        evaluations = fixed_point.evaluations;
+        const ActiveMask moved = fixed_point.step(k, time, q[0], rate[0], active);
+        this->evaluations = fixed_point.evaluations;
         return moved;
     }
     void follow(const ScalarFallback<K>& single, int lane) {
-        follow_state(single, lane);
+        this->follow_state(single, lane);
         fixed_point.recall([&](int c, int i) { return single.node_velocity(c, i); }, lane);
         if constexpr (K::clocked) {
             set_lane(fixed_point.elapsed, lane, single.elapsed);
-            for (int i = 0; i < K::nodes; ++i) set_lane(fixed_point.rates[i], lane, single.rates[i]);
+            for (int i = 0; i < r; ++i) set_lane(fixed_point.rates[i], lane, single.rates[i]);
         }
     }
 
-private:
-    void follow_state(const ScalarFallback<K>& single, int lane) {
+    template <class Given>
+    LOBATTO_LANE void displacements(const Given&, const T&, const T*, const T*, T (*moved)[n]) const {
+        static constexpr Table table{};
         for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(p[c], lane, single.p[c]);
+            moved[0][c] = T(real(0));
+            for (int j = 0; j < controls; ++j) {
+                T sum = T(real(0));
+                for (int i = 0; i < r; ++i) sum = fused(T(table.reach[j * r + i]), fixed_point.v[c * r + i], sum);
+                moved[j + 1][c] = T(fixed_point.h) * sum;
+            }
         }
     }
+    // By Newton's iteration from the velocity of the last node (D27).
+    template <class Given>
+    LOBATTO_LANE KnownVelocities<T> velocities(const Given& k, const T& time, T* velocity) const {
+        static constexpr Table table{};
+        T change = T(real(0)), size = T(real(0)), left = T(real(0)), whole = T(real(0));
+        for (int c = 0; c < n; ++c) velocity[c] = fixed_point.v[c * r + r - 1];
+        for (int iteration = 0; iteration < 3; ++iteration) {
+            T residual[n], packed[K::mass_entries], M[n * n];
+            Formulas<K>::legendre(k, time, this->positions(), velocity, residual, packed);
+            for (int i = 0; i < n * n; ++i) M[i] = T(real(0));
+            for (int e = 0; e < K::mass_entries; ++e) M[table.row[e] * n + table.column[e]] = packed[e];
+            factor_symmetric<n>(M);
+            left = whole = T(real(0));
+            for (int c = 0; c < n; ++c) {
+                residual[c] = rate[0][c] - residual[c];
+                left += fabs(residual[c]);
+                whole += fabs(rate[0][c]);
+            }
+            solve_symmetric<n>(M, residual);
+            change = size = T(real(0));
+            for (int c = 0; c < n; ++c) {
+                velocity[c] += residual[c];
+                change += fabs(residual[c]);
+                size += fabs(velocity[c]);
+            }
+        }
+        const T root = T(Limits<real>::root_epsilon);
+        return {change <= root * size, left <= root * whole};
+    }
+    template <class Single>
+    void lend_step(const T (*moved)[n], Single& single, int lane) const {
+        this->lend_end(single, lane);
+        for (int b = 0; b < Single::active; ++b)
+            for (int j = 0; j < controls; ++j)
+                single.Y[Single::Layout::index(b, j)] = lane_of(moved[j + 1][K::active_index[b]], lane);
+        for (int c = 0; c < Single::cyclic; ++c)
+            for (int i = 0; i < r; ++i)
+                single.cyclic_rates[i * Single::cyclic + c] = lane_of(fixed_point.v[K::cyclic_index[c] * r + i], lane);
+        single.is_current = true;
+    }
+
+private:
+    struct Table {  // of K, for indices that are no constants: a device has no address of K's own
+        real reach[controls * r]{};
+        int row[K::mass_entries]{}, column[K::mass_entries]{};
+        constexpr Table() {
+            for (int i = 0; i < controls * r; ++i) reach[i] = K::reach[i];
+            for (int e = 0; e < K::mass_entries; ++e) {
+                row[e] = K::mass_row[e];
+                column[e] = K::mass_column[e];
+            }
+        }
+    };
 };
 
 }  // namespace lobatto

@@ -4,8 +4,8 @@
 // Of the n coordinates n_a are active (active_index[]); the others are cyclic (cyclic_index[]), and their momenta P are
 // conserved. Control points 0 = x_0 < ... < x_m = 1 carry the positions X_j of the active ones; X_0 is the start, X_m
 // the end. Nodes c_i with weights b_i, i = 1 ... r, are where the Lagrangian is looked at, at time t + c_i h:
-//     v_i = (1/h) sum_j D_ij X_j,   q_i = sum_j B_ij X_j,   P_i = P + kappa pi(c_i),   B_ij = l_j(c_i), D_ij =
-//     l_j'(c_i)
+//     v_i = (1/h) sum_j D_ij X_j,   q_i = sum_j B_ij X_j,   P_i = P + kappa pi(c_i),
+//     D_ij = l_j'(c_i),             B_ij = l_j(c_i),
 // with pi the shifted Legendre polynomial of degree r - 1 for Lobatto's nodes, where the conserved momenta are so only
 // in the mean, and nothing for Gauss's. z = (v, q, P), R(z) = L - P . v_c with the cyclic velocities v_c eliminated, F
 // the forces, g = (R_v, R_q + F, R_P = -v_c), and H its derivative:
@@ -22,8 +22,10 @@
 // Lambda_m follows from the momentum at the end (iteration/velocity_of_momentum.hpp).
 //
 // A kernel of this form provides: active, cyclic and their tables; nodes (r), controls (m + 1), c, b, control, B, D,
-// extrapolation (l_k(1 + x_j)), legendre_polynomial (pi_i, all zero for Gauss); the tables of base/grouped.hpp for the
-// active coordinates; node(k, z, g, H), slope(k, z, g); entries, entry_row, entry_column of H;
+// extrapolation (l_k(1 + x_j)), legendre_polynomial (pi_i, all zero for Gauss); for fixed-point iterations integration
+// (A, over the polynomials on the nodes), reach (the same to the control points), ahead (those polynomials at 1 + c_i)
+// and stage(k, q, velocity, Lv, Lq, M); the tables of base/grouped.hpp for the active coordinates; node(k, z, g, H),
+// slope(k, z, g); entries, entry_row, entry_column of H;
 // legendre(k, q, velocity, p, M), mass_entries, mass_row, mass_column; momentum(k, q, velocity, p);
 // energy(k, q, velocity); slopes(k, q, velocity, Lv, Lq), dL/dv and dL/dq + F over all coordinates.
 #ifndef LOBATTO_KERNEL_GALERKIN_EQUATIONS_HPP
@@ -58,10 +60,11 @@ struct NodeTables {
     // The block of unknowns that a slot depends on: a coordinate, or after them a kappa or a multiplier.
     static constexpr int block(int slot) { return slot < active ? slot : slot - active; }
 
-    static constexpr bool has_kappa() {
+    // How many conserved momenta vary within a step.
+    static constexpr int kappas() {
         for (int i = 0; i < r; ++i)
-            if (cyclic > 0 && K::legendre_polynomial[i] != real(0)) return true;
-        return false;
+            if (K::legendre_polynomial[i] != real(0)) return cyclic;
+        return 0;
     }
     // Every node is a control point: B = I.
     static constexpr bool is_nodal() {
@@ -113,7 +116,7 @@ struct GalerkinEquations : Motion<K> {
     using Tables = NodeTables<K>;
     static constexpr int active = K::active, cyclic = K::cyclic, Z = Tables::Z, r = Tables::r, m = Tables::m;
     static constexpr int constraints = Tables::constraints, blocks = Tables::blocks;
-    static constexpr int kappas = Tables::has_kappa() ? cyclic : 0;
+    static constexpr int kappas = Tables::kappas();
     static constexpr bool nodal = Tables::is_nodal();
     static_assert(nodal || constraints == 0, "constraints hold at control points, and multipliers belong to nodes");
     static constexpr int N = blocks * m + kappas;

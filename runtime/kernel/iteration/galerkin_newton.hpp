@@ -7,6 +7,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "constraint_rounding.hpp"
 #include "convergence.hpp"
 #include "galerkin_equations.hpp"
@@ -28,7 +29,6 @@ protected:
     using Equations::apply_node_map, Equations::node_variables, Equations::evaluate_nodes, Equations::sum_over_nodes,
         Equations::assemble, Equations::carry;
 
-    struct Nothing {};
     struct Frozen {
         Matrix matrix;
         real H[entry_room];
@@ -79,10 +79,10 @@ private:
             for (int j = 0; j < m; ++j) {
                 const int i = Layout::index(b, j);
                 a.Y[i] += a.delta[i];
-                change = fabs(a.delta[i]) > change ? fabs(a.delta[i]) : change;
-                size = fabs(a.Y[i]) > size ? fabs(a.Y[i]) : size;
+                change = maximum(fabs(a.delta[i]), change);
+                size = maximum(fabs(a.Y[i]), size);
             }
-            if (size < change) size = change;  // it came back to 0, where a constraint holds it
+            size = maximum(change, size);  // it came back to 0, where a constraint holds it
             if (change > e * size) e = change / size;
         }
         for (int c = active; c < blocks; ++c)
@@ -184,8 +184,8 @@ private:
         a.matrix.solve(rounding);
         real most = real(0), largest = real(0);
         for (int i = 0; i < N; ++i) {
-            most = fabs(rounding[i]) > most ? fabs(rounding[i]) : most;
-            largest = fabs(a.delta[i]) > largest ? fabs(a.delta[i]) : largest;
+            most = maximum(fabs(rounding[i]), most);
+            largest = maximum(fabs(a.delta[i]), largest);
         }
         return largest <= real(Rule::noise) * Limits<real>::epsilon * most;
     }

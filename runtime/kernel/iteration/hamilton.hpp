@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Iterations over nodes (iteration/galerkin.hpp) where V = dH/dP(Q, P) and F = -dH/dQ + forces are formulas (D62): no
-// matrix is formed. One takes F, then P, then V; what V has along pi it loses, and kappa takes the momentum of it, at
-// the middle of the step.
+// matrix is formed. One takes F, then P, then V; V is projected to be orthogonal to pi, and kappa absorbs the
+// corresponding momentum, at the middle of the step.
 #ifndef LOBATTO_KERNEL_HAMILTON_HPP
 #define LOBATTO_KERNEL_HAMILTON_HPP
 

@@ -28,11 +28,7 @@ template <class K>
 constexpr bool fits_registers() {
     using real = typename K::real;
     constexpr int width = native_lanes<real>, parts = (K::coordinates + width - 1) / width;
-    if constexpr (K::neighbours)
-        return width * sizeof(real) == 64 && parts * (K::points - 2) <= 16 && K::row_reach >= 0 &&
-               K::row_reach <= width;
-    else
-        return false;
+    return width * sizeof(real) == 64 && parts * (K::points - 2) <= 16 && K::row_reach >= 0 && K::row_reach <= width;
 }
 
 // One trajectory; its state, the memory of its last step, and room for the next. Most steps are quick ones: as many

@@ -11,6 +11,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "convergence.hpp"
 #include "stage_equations.hpp"
 
@@ -81,7 +82,6 @@ private:
         real S[entry_room];
         bool usable, is_factored;
     };
-    struct Nothing {};
 
     static real node_time(real time, real h, int i) { return time + K::c[i + 1] * h; }
 
@@ -110,7 +110,7 @@ private:
                 real relative = d * a.inverse_scale[k];
                 // A coordinate at rest that only the others move: its own displacement is the measure.
                 if (a.inverse_scale[k] == real(0) && d > real(0)) relative = d / (d + fabs(a.Q[i * n + k]));
-                e = relative > e ? relative : e;
+                e = maximum(relative, e);
                 a.net += a.delta[i * n + k] < real(0) ? -relative : relative;
             }
         for (int i = 0; i < N; ++i) a.Q[i] += a.delta[i];

@@ -16,7 +16,7 @@ struct StageCoefficients {
     static constexpr int s = K::points, m = s - 2, columns = m > 0 ? m : 1;
     real map[m + 1][columns]{}, before[m + 1][s]{}, sum[m + 1]{};
 
-    // Each number is set before it is read: g++ 13 stops with an error of its own at elements that {} alone has set.
+    // Each number is set before it is read: g++ 13 has an internal compiler error at elements that {} alone has set.
     constexpr StageCoefficients() {
         for (int i = 0; i <= m; ++i) {
             real total = real(0), of_before[s]{};

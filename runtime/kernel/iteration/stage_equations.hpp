@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The equations of one step of a system with constant mass, as Newton's iteration and the tests need them: the stages
-// (D11 ... D15), their Jacobian (D13) and the end of the step (D16, D17). docs/derivation.md derives them.
+// The equations of one step of a system with constant mass, as Newton's iteration and the tests take them: the stages
+// (D11 ... D15), their Jacobian (D13) and the end of the step (D16, D17). docs/derivation.md derives them. Iterations
+// over nodes have their own text of them: stage_map.hpp, fixed_point.hpp, ensemble_fixed_point.hpp, steppers/clean.hpp.
 //
 // Arrays are node-major: Q[i * n + k] is coordinate k at interior node i. W = M^-1 (grad V - F), S = dW/dq.
 #ifndef LOBATTO_KERNEL_STAGE_EQUATIONS_HPP

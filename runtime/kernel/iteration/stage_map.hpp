@@ -56,8 +56,6 @@ template <class real>
 constexpr int node_lanes =
     register_bytes > 32 && native_lanes<real> > 1 ? native_lanes<real> * 32 / register_bytes : native_lanes<real>;
 
-struct Unit {};
-
 template <class K, class T>
 struct StageMap {
     using real = typename K::real;
@@ -82,12 +80,12 @@ struct StageMap {
     Map map[maps];
     V node_time[parts];               // h c
     V weight[parts], arrival[parts];  // -h b and -h^2 b (1 - c), for a trajectory's Packs; zero in lanes to spare
-    std::conditional_t<absorbs, T[n], Unit> diagonal{};
+    std::conditional_t<absorbs, T[n], Nothing> diagonal{};
     real h{};
     ActiveMask usable{};
     bool has_history{};
-    T w[n * s];                                          // W at the nodes of the last step; the last of each at q
-    std::conditional_t<absorbs, T[n * s], Unit> rest{};  // W - D q there
+    T w[n * s];                                             // W at the nodes of the last step; the last of each at q
+    std::conditional_t<absorbs, T[n * s], Nothing> rest{};  // W - D q there
 
     // The tables of one trajectory; `lane` is its place in T.
     void prepare(const typename K::Coefficients& k, real step, int lane = 0) {

@@ -13,21 +13,8 @@
 #include "../base/contract.hpp"
 #include "../base/dense.hpp"
 #include "../base/numbers.hpp"
-#include "time_coordinate.hpp"
 
 namespace lobatto {
-
-// Whether momenta are 0 at rest as differences of terms that are not, as exp(v) - 1 is.
-template <class K, class = void>
-struct MomentaCancel : std::false_type {};
-template <class K>
-struct MomentaCancel<K, std::void_t<decltype(K::momentum_summand_count)>> : std::true_type {};
-
-// Whether masses change with velocities, as those of relativity do, and no constraint holds these.
-template <class K, class = void>
-struct MassNeedsVelocity : std::false_type {};
-template <class K>
-struct MassNeedsVelocity<K, std::void_t<decltype(K::mass_needs_velocity)>> : std::true_type {};
 
 template <class K>
 class VelocityOfMomentum {
@@ -104,14 +91,14 @@ private:
 
     static void rest(const State& at, Arrays& a) {
         for (int i = 0; i < unknowns; ++i) a.x[i] = real(0);
-        if constexpr (HasTimeCoordinate<K>::value) a.x[n - 1] = Formulas<K>::clock(at.k, at.time, at.q);
+        if constexpr (K::has_time_coordinate) a.x[n - 1] = Formulas<K>::clock(at.k, at.time, at.q);
     }
 
     // Both equations at x; whether they have values there.
     LOBATTO_APART static bool evaluate(const State& at, const real* x, Arrays& a) {
         Formulas<K>::legendre(at.k, at.time, at.q, x, a.p, a.mass);
         for (int i = 0; i < n; ++i) a.residual[i] = at.p[i] - a.p[i];
-        if constexpr (HasTimeCoordinate<K>::value) a.residual[n - 1] = real(0);
+        if constexpr (K::has_time_coordinate) a.residual[n - 1] = real(0);
         for (int c = 0; c < constraints; ++c) a.residual[n + c] = -a.phi_t[c];
         each_slope([&](int e, int c, int i) {
             a.residual[i] -= a.G[e] * x[n + c];
@@ -130,9 +117,9 @@ private:
     static void set_matrix(Arrays& a) {
         a.matrix.clear();
         for (int e = 0; e < K::mass_entries; ++e)
-            if (!HasTimeCoordinate<K>::value || K::mass_row[e] < n - 1)
+            if (!K::has_time_coordinate || K::mass_row[e] < n - 1)
                 a.matrix(K::mass_row[e], 0, K::mass_column[e], 0) += a.mass[e];
-        if constexpr (HasTimeCoordinate<K>::value) a.matrix(n - 1, 0, n - 1, 0) = real(1);
+        if constexpr (K::has_time_coordinate) a.matrix(n - 1, 0, n - 1, 0) = real(1);
         each_slope([&](int e, int c, int i) {
             a.matrix(i, 0, n + c, 0) += a.G[e];
             a.matrix(n + c, 0, i, 0) += a.G[e];
@@ -171,7 +158,7 @@ private:
     // At rest there is no inverse, as of v^4, and no value of x'^2/t': the multiple of a direction whose own momentum
     // is nearest. Directions are that of the momentum, and where rest has no value those of the coordinates.
     static void begin_along(const State& at, const real* direction, Arrays& a) {
-        constexpr int moving = HasTimeCoordinate<K>::value ? n - 1 : n;
+        constexpr int moving = K::has_time_coordinate ? n - 1 : n;
         real best = real(0), nearest = -real(1);
         rest(at, a);
         for (real scale = real(0x1p-40); scale <= real(0x1p40); scale *= real(2)) {
@@ -213,12 +200,9 @@ private:
             if (mass[i] > real(0))
                 size[n + c] += fabs(a.G[e]) * (sqrt(twice_energy / mass[i]) + fabs(at.p[i]) / mass[i]);
         });
-        if constexpr (MomentaCancel<K>::value) {
+        if constexpr (K::momentum_summand_count > 0) {  // momenta are 0 at rest as differences, as exp(v) - 1 is
             real T[K::momentum_summand_count];
-            if constexpr (K::autonomous)
-                K::momentum_summands(at.k, at.q, a.x, T);
-            else
-                K::momentum_summands(at.k, at.time, at.q, a.x, T);
+            Formulas<K>::momentum_summands(at.k, at.time, at.q, a.x, +T);
             for (int e = 0; e < K::momentum_summand_count; ++e)
                 size[K::momentum_summand_row[e]] += real(0.5) * fabs(T[e]);
         }

@@ -30,14 +30,6 @@
 
 namespace lobatto {
 
-// a + b = sum + error, for any sizes of a and b.
-template <class V>
-LOBATTO_INLINE V add_with_error(const V& a, const V& b, V& error) {
-    const V sum = a + b, of_b = sum - a;
-    error = (a - (sum - of_b)) + (b - of_b);
-    return sum;
-}
-
 template <class real>
 constexpr bool has_64_bits = std::is_same_v<real, long double>&& std::numeric_limits<real>::digits == 64;
 
@@ -296,10 +288,8 @@ struct CleanFixedPoint {
             change.value.store(a.u1 + c);
             change.rest.store(a.u1_rest + c);
         });
-        real sum = real(0);
-        for (int c = 0; c < n; ++c)
-            sum += (a.q1[c] - a.q1[c]) + (a.u1[c] - a.u1[c]) + (next[(s - 1) * n + c] - next[(s - 1) * n + c]);
-        if (!(sum == real(0))) return false;
+        if (!is_finite(not_finite_part(a.q1, n) + not_finite_part(a.u1, n) + not_finite_part(next + (s - 1) * n, n)))
+            return false;
         for (int c = 0; c < n; ++c) {
             q[c] = a.q1[c];
             q_rest[c] = a.q1_rest[c];

@@ -4,7 +4,7 @@
 // The chain is that of Form::general for Lambda(q, w) = g (L(q, w / g) + E), w = dq/dtau, with the energy E of the
 // start (D42). Its steps last as long as the quadrature of g along them says (D43). A state at a given time is the end
 // of a step of the chain that is shortened until it ends there: it has the order of the steps, and the chain goes on
-// as if nobody had asked. Velocities that callers give and get are dq/dt.
+// unaffected. Velocities that callers give and get are dq/dt.
 //
 // Where the energy changes, the time is the last coordinate, and minus the energy its momentum (D64). A start sets
 // both.
@@ -21,8 +21,8 @@ namespace lobatto {
 // The motion in tau comes near a place where the clock is 0, but not beyond it. Errors of its energy grow there like
 // one over the clock, and may throw it back. So where the clock has become small, the energy is looked at: it may be
 // off by a part of the larger of p.v here and where the clock became small. (At walls p.v vanishes, at poles it grows.)
-// The equations of a step may have a second solution, far away, where the clock is fast: so it is looked at, too, where
-// the clock is much faster than a step ago. No motion makes it faster by a million.
+// The equations of a step may have a second solution, far away, where the clock is fast: so the energy is looked at,
+// too, where the clock is much faster than a step ago. No motion makes it faster by a million.
 template <class real>
 struct WatchedClock {
     real energy_of_start{};  // 0 where the time is a coordinate
@@ -60,7 +60,7 @@ struct Stepper<K, Form::general, Stepping::clocked> : Stepper<K, Form::general, 
     using Chain = Stepper<K, Form::general, Stepping::solved>;
     using Chain::n, Chain::q, Chain::p, Chain::q_before, Chain::coefficients, Chain::step_size, Chain::elapsed;
     using typename Chain::real;
-    static constexpr bool has_time_coordinate = HasTimeCoordinate<K>::value;
+    static constexpr bool has_time_coordinate = K::has_time_coordinate;
     static constexpr int moving = has_time_coordinate ? n - 1 : n;
 
     typename K::Parameters values{};                      // the last one is E of (D42), or sigma of (D64)

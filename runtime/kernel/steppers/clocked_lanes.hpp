@@ -3,8 +3,8 @@
 // steps. A lane whose trajectory has ended takes the next one.
 //
 // A trajectory arrives at the times start + interval, start + 2 interval, ... Lanes whose step has passed such a time
-// shorten it together (steppers/shortened.hpp), where somebody asks for the state. Of other arrivals a lane keeps the
-// step that passed the last one: its state is the last good one of a motion that fails.
+// shorten it together (steppers/shortened.hpp), where the state is output. For arrivals without output a lane stores
+// only the step that passed the latest one: its state is the last good one of a motion that fails.
 #ifndef LOBATTO_KERNEL_CLOCKED_LANES_HPP
 #define LOBATTO_KERNEL_CLOCKED_LANES_HPP
 
@@ -19,15 +19,15 @@ struct ClockedEnsemble : Ensemble<K, width> {
     using Base::n, Base::coefficients, Base::motion, Base::parameters, Base::coefficients_of, Base::single,
         Base::step_size, Base::steps;
     using typename Base::real, typename Base::T, typename Base::ActiveMask;
-    static constexpr int columns = 1 + 2 * n;
+    static constexpr int columns = 1 + 2 * n, events_of_step = 0;
     static constexpr std::int64_t most_steps = 4096;     // of the chain in one call
-    static constexpr std::int64_t most_skipped = 65536;  // times that lanes leave arrivals nobody asks for, likewise
+    static constexpr std::int64_t most_skipped = 65536;  // times that lanes pass arrivals without output, likewise
     // To shorten a step takes about as long as two steps, for one lane as for all. So lanes wait for each other.
     static constexpr int most_waited = 2 * width;
 
     LongTime<T> now, before;  // of the chain: where it is, and a step ago
     T q_before[n], p_before[n];
-    LongTime<T> passed;  // the start of the step that passed the last arrival of those that nobody asked for
+    LongTime<T> passed;  // the start of the step that passed the latest arrival without output
     T q_passed[n], p_passed[n];
     T target;  // the time of the next arrival
     real origin[width]{}, tolerance{}, interval{}, end{};
@@ -154,8 +154,8 @@ private:
     // A step of the chain in the lanes that move; `active`: all lanes that have not left.
     template <class Leave>
     void step(ActiveMask moving, const ActiveMask& active, T& evaluations, const Leave& leave) {
-        set_where(moving, q_before, motion.q);
-        set_where(moving, p_before, motion.p);
+        set_where(moving, q_before, motion.positions());
+        set_where(moving, p_before, motion.rates());
         const ActiveMask moved = motion.step(coefficients, now.time, moving);
         evaluations += motion.evaluations;
         if (any(moving & !moved)) this->retry(moving & !moved, now.time, evaluations, leave);
@@ -178,7 +178,7 @@ private:
         return watch.keeps_energy(single, q, p);
     }
 
-    // Leaves those of the lanes that arrive where somebody asks for their states; whether there were others.
+    // Leaves those of the lanes that arrive whose states are output; whether there were others.
     template <class Call>
     bool skip(const Call& call, ActiveMask& arriving) {
         ActiveMask skipped = arriving;
@@ -205,8 +205,8 @@ private:
         const ActiveMask here = arriving & (now.until(target) == T(real(0)));
         const T wanted = before.until(target), whole = before.until(now.time) + now.rest;
         const ActiveMask found = here | shortened.find(*this, wanted, whole, arriving & !here);
-        set_where(here, shortened.found_q, motion.q);
-        set_where(here, shortened.found_p, motion.p);
+        set_where(here, shortened.found_q, motion.positions());
+        set_where(here, shortened.found_p, motion.rates());
         bool has_left = false;
         for (int lane = 0; lane < width; ++lane) {
             if (!arriving[lane]) continue;
@@ -248,11 +248,7 @@ private:
     void put_row(const Call& call, int lane, std::int64_t arrival, const Number* q, const Number* p) {
         real* const row =
             static_cast<real*>(call.records) + (lane * call.capacity + call.records_written[lane]++) * columns;
-        row[0] = time_of(lane, arrival);
-        for (int c = 0; c < n; ++c) {
-            row[1 + c] = lane_of(q[c], lane);
-            row[1 + n + c] = lane_of(p[c], lane);
-        }
+        put_state<n>(time_of(lane, arrival), q, p, row, lane);
     }
 };
 

@@ -32,10 +32,7 @@ inline void set_coefficients(typename K::template CoefficientsOf<T>& all, int la
 // Whether lanes can follow the motion: walls, switches and constraints are followed by one trajectory at a time.
 template <class K>
 constexpr bool is_for_lanes() {
-    if constexpr (K::events > 0)
-        return constraints_of<K>() == 0 && K::impacts == 0 && K::switches == 0;
-    else
-        return constraints_of<K>() == 0;
+    return K::constraints == 0 && K::impacts == 0 && K::switches == 0;
 }
 
 // How many of `trajectories` stand side by side: a register of each value; two, which hide each other's latency, where
@@ -43,10 +40,8 @@ constexpr bool is_for_lanes() {
 template <class K>
 constexpr int ensemble_lanes(int trajectories) {
     constexpr int native = native_lanes<typename K::real>;
-    if (native == 1 || !K::any_number || is_clean<K> || is_clocked<K> || !is_for_lanes<K>()) return 0;
-    if constexpr (K::form == Form::separable) {
-        if (K::neighbours) return moves_immediately<K>() && trajectories >= native ? native : 0;
-    }
+    if (native == 1 || !K::any_number || K::clean || K::clocked || !is_for_lanes<K>()) return 0;
+    if (K::neighbours) return K::is_explicit && K::immediate && trajectories >= native ? native : 0;
     if (K::form == Form::general) return K::coordinates > most_full ? 0 : native;
     return trajectories >= 2 * native && K::coordinates <= 2 ? 2 * native : native;
 }
@@ -54,17 +49,14 @@ constexpr int ensemble_lanes(int trajectories) {
 // The same for lanes that are refilled (steppers/refilled.hpp).
 template <class K>
 constexpr int refilled_lanes(int trajectories) {
-    if constexpr (K::form == Form::separable) {
-        if (K::neighbours) return 0;
-    }
-    return ensemble_lanes<K>(trajectories);
+    return K::neighbours ? 0 : ensemble_lanes<K>(trajectories);
 }
 
 // And of those with a clock (steppers/clocked_lanes.hpp): where steps are iterations over velocities.
 template <class K>
 constexpr int clocked_lanes() {
     constexpr int native = native_lanes<typename K::real>;
-    const bool iterates = K::any_number && K::autonomous && !K::linear && constraints_of<K>() == 0;
+    const bool iterates = K::any_number && K::autonomous && !K::linear && K::constraints == 0;
     return native > 1 && iterates && K::coordinates <= most_full ? native : 0;
 }
 template <class K, int width>
@@ -166,7 +158,7 @@ protected:
     // The state of a lane; `single` has its coefficients from then on.
     void state_of(int lane, real* q, real* p) const {
         single.coefficients = coefficients_of[lane];
-        for (int c = 0; c < n; ++c) q[c] = lane_of(motion.position(c), lane);
+        for (int c = 0; c < n; ++c) q[c] = lane_of(motion.positions()[c], lane);
         motion.momentum(single, lane, p);
     }
 
@@ -186,7 +178,7 @@ protected:
     }
     // The same in the midst of a motion: one with a clock has what is known of its start among its parameters.
     Status go_on_alone(int lane, real time, const real* q, const real* p) {
-        if constexpr (is_clocked<K>) {
+        if constexpr (K::clocked) {
             const Status status = single.prepare(parameters[lane], step_size);
             return status == Status::ok ? single.start(time, q, p, single.known_of_start()) : status;
         } else {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where event functions change their sign between two steps.
+// Locates, inside one step, where a watched function changes sign: events, stops, walls, switches.
 //
 // An event of g(t, q, q') = 0 happens where the sign of g changes. Its places are isolated on the step's polynomial: g
 // is sampled at twice as many pieces as the step has nodes, and between samples where |g| is least. What decides is
@@ -11,6 +11,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "sampled_function.hpp"
 #include "watched_stepper.hpp"
 
@@ -130,36 +131,31 @@ private:
 
     // t, q, p at t + theta h, by a step of that length.
     LOBATTO_APART void state_at(real theta, real* row) {
-        row[0] = Between<K>::time(*step, theta);
-        real* const momentum = row + 1 + n;
+        real momentum[n];
+        const real there = Between<K>::time(*step, theta);
         if (theta == real(1)) {
-            for (int k = 0; k < n; ++k) row[1 + k] = step->q[k];
             step->momentum(momentum);
-            return;
+            return put_state<n>(there, step->q, momentum, row);
         }
-        for (int k = 0; k < n; ++k) {
-            row[1 + k] = q[k];
-            momentum[k] = p[k];
-        }
+        put_state<n>(there, q, p, row);
         const real length = theta * step->step_size;
         if (time + length == time) return;
         Status done = partial->prepare(step->parameters, length);
         partial->tolerance = step->tolerance;
         if (done == Status::ok) {
-            if constexpr (is_clocked<K>)
+            if constexpr (K::clocked)
                 done = partial->start(time, q, p, step->known_of_start());
             else
                 done = partial->start(time, q, p);
         }
         if (done == Status::ok) done = partial->step();
-        if (is_clocked<K> && done == Status::time_stands_still) return;  // so short that it ends where it begins
+        if (K::clocked && done == Status::time_stands_still) return;  // so short that it ends where it begins
         if (done != Status::ok) {
             status = done;
             return;
         }
-        if constexpr (is_clocked<K>) row[0] = partial->time();
-        for (int k = 0; k < n; ++k) row[1 + k] = partial->q[k];
         partial->momentum(momentum);
+        put_state<n>(K::clocked ? partial->time() : there, partial->q, momentum, row);
     }
     LOBATTO_APART real exactly(real theta, int e) {
         real values[K::events];
@@ -295,7 +291,7 @@ private:
             const real value = samples[sample_at(j)].value;
             if (!has_sign(value) || changes(value, samples[i].value)) return false;
             y[j] = fabs(value);
-            if (y[j] > largest) largest = y[j];
+            largest = maximum(y[j], largest);
         }
         return is_no_dip<pieces>(y, piece_at(i), largest);
     }
@@ -315,13 +311,16 @@ private:
         }
     }
 
+    real largest_value() const {
+        real largest = real(0);
+        for (int i = 0; i < sample_count; ++i)
+            if (is_finite(samples[i].value)) largest = maximum(fabs(samples[i].value), largest);
+        return largest;
+    }
     // Of what is not small along the step.
     bool is_zero(const Sample& sample, int e) {
         if (is_wall(e)) return fabs(sample.value) <= slack[e - first_wall];
-        real largest = real(0);
-        for (int i = 0; i < sample_count; ++i)
-            if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
-        return sample.is_exact && fabs(sample.value) <= Limits<real>::root_epsilon * largest &&
+        return sample.is_exact && fabs(sample.value) <= Limits<real>::root_epsilon * largest_value() &&
                is_rounding(sample.theta, e);
     }
     // Whether g is as small there as the roundings of what it is computed from make it: 64 of each number, and of the
@@ -337,8 +336,7 @@ private:
         real place[n], begin[n], end[n];  // velocities
         step->polynomial(real(0), place, begin);
         step->polynomial(real(1), place, end);
-        const real few = real(64) * Limits<real>::epsilon, h = fabs(step->step_size),
-                   passed = fabs(row[0]) > h ? fabs(row[0]) : h;
+        const real few = real(64) * Limits<real>::epsilon, h = fabs(step->step_size), passed = maximum(fabs(row[0]), h);
         real change = real(0);
         for (int k = 0; k <= 2 * n; ++k) {
             real& number = k == 0 ? row[0] : k <= n ? row[k] : velocity[k - n - 1];
@@ -356,10 +354,7 @@ private:
     // Whether a change of sign between two steps, from this value to that of the first sample, is a zero: the state
     // goes on, so that both are small. At a pole, or where g jumps, they are not.
     bool is_small_at_start(real before) const {
-        real largest = real(0);
-        for (int i = 0; i < sample_count; ++i)
-            if (is_finite(samples[i].value) && fabs(samples[i].value) > largest) largest = fabs(samples[i].value);
-        const real here = fabs(samples[0].value), few = real(0.125) * largest;
+        const real here = fabs(samples[0].value), few = real(0.125) * largest_value();
         return here <= Limits<real>::root_epsilon * fabs(before) || (here <= few && fabs(before) <= few);
     }
 

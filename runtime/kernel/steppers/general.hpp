@@ -10,21 +10,21 @@
 #include "../base/dense.hpp"
 #include "../base/numbers.hpp"
 #include "../iteration/constrained_fixed_point.hpp"
+#include "../iteration/constraint_checks.hpp"
 #include "../iteration/extrapolation.hpp"
 #include "../iteration/galerkin.hpp"
-#include "../iteration/galerkin_constraints.hpp"
 #include "../iteration/velocity_of_momentum.hpp"
 
 namespace lobatto {
 
 template <class K>
-struct Stepper<K, Form::general, Stepping::solved> : GalerkinConstraints<K> {
-    using Newton = GalerkinConstraints<K>;
+struct Stepper<K, Form::general, Stepping::solved> : ConstraintChecks<K> {
+    using Newton = ConstraintChecks<K>;
     using Newton::multiplier_room;
     using Newton::n, Newton::active, Newton::constraints, Newton::cyclic, Newton::Z, Newton::r, Newton::m,
         Newton::kappas, Newton::N, Newton::room, Newton::entry_room, Newton::cyclic_room, Newton::coefficients,
         Newton::step_size, Newton::q, Newton::p, Newton::iterations, Newton::increment, Newton::workspace;
-    using typename Newton::real, typename Newton::Arrays, typename Newton::Layout, typename Newton::Nothing;
+    using typename Newton::real, typename Newton::Arrays, typename Newton::Layout;
     static constexpr int nodes = K::nodes;
 
     // Fixed-point iterations need the mass matrix of a node alone, which is full for them unless it is light.
@@ -149,7 +149,7 @@ struct Stepper<K, Form::general, Stepping::solved> : GalerkinConstraints<K> {
             const Status status = velocity(time, position, momentum, v);
             if (status != Status::ok) return status;
             *value = Formulas<K>::energy(coefficients, time, position, v);
-            if constexpr (MassNeedsVelocity<K>::value) {
+            if constexpr (K::mass_needs_velocity) {
                 // H errs by dH/dv = M v times the error of v, and by its square with the momentum that is known (D26).
                 real Lv[n], Lq[n];
                 slopes(time, position, v, Lv, Lq);
@@ -244,10 +244,10 @@ private:
     }
 
     template <class AnyFixedPoint>
-    void begin_fixed_point(AnyFixedPoint& any, const real* v) {
+    void begin_fixed_point(AnyFixedPoint& any, [[maybe_unused]] const real* v) {
         any.pause = Pause();
         if constexpr (iterates_on_constraints)
-            any.iteration.begin(v);
+            any.iteration.has_history = false;
         else
             any.iteration.begin(coefficients, this->time(), q, v);
     }
@@ -257,14 +257,17 @@ private:
     bool iterate(AnyFixedPoint& any) {
         const bool paused = any.pause.left > 0;
         if (!any.pause.count_down()) return false;
-        if (paused) any.iteration.recall([this](int c, int i) { return node_velocity(c, i); });
+        if constexpr (iterates_on_constraints)
+            any.iteration.has_history = any.iteration.has_history && !paused;
+        else if (paused)
+            any.iteration.recall([this](int c, int i) { return node_velocity(c, i); });
         real q1[n], p1[n];
         for (int k = 0; k < n; ++k) {
             q1[k] = q[k];
             p1[k] = p[k];
         }
         any.iteration.tolerance = this->tolerance;
-        if (any.iteration.step(coefficients, this->time(), q1, p1, true)) {
+        if (any.iteration.step(coefficients, this->time(), q1, p1)) {
             for (int k = 0; k < n; ++k) {
                 q_before[k] = q[k];
                 q[k] = q1[k];
@@ -327,8 +330,7 @@ private:
             for (int i = 0; i < r; ++i) {
                 this->node_variables(q, p, a.Y, i, a.z);
                 for (int b = 0; b < active; ++b) Q[K::active_index[b]] = a.z[active + b];
-                rates[i] =
-                    HasTimeCoordinate<K>::value ? a.z[active - 1] : Formulas<K>::clock(coefficients, this->time(), Q);
+                rates[i] = K::has_time_coordinate ? a.z[active - 1] : Formulas<K>::clock(coefficients, this->time(), Q);
                 passed += K::b[i] * rates[i];
             }
         }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A stepper with all that its kernel looks for: events, stops, impacts, switches. A step is one from t to t + h,
-// whatever it meets on the way. For programs that hold a kernel's text; it allocates when it starts.
+// A stepper that also handles events, stops, impacts and switches. A step is one from t to t + h, whatever it meets on
+// the way. For programs that hold a kernel's text; it allocates when it starts.
 #ifndef LOBATTO_KERNEL_HYBRID_STEPPER_HPP
 #define LOBATTO_KERNEL_HYBRID_STEPPER_HPP
 

@@ -10,6 +10,7 @@
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
+#include "../iteration/lane_state.hpp"
 #include "../iteration/tangent.hpp"
 
 namespace lobatto {
@@ -33,13 +34,12 @@ inline void round_to_unit_determinant(real* E) {
             for (const real c : candidates[2])
                 for (const real d : candidates[3]) {
                     const real ad = a * d, bc = b * c;
-                    // tr E + det E, the terms and their rounding, summed without loss (TwoSum).
+                    // tr E + det E, the terms and their rounding, summed without loss.
                     const real terms[6] = {a, d, ad, -bc, rounded_once(a, d, -ad), -rounded_once(b, c, -bc)};
-                    real sum = real(0), lost = real(0);
+                    real sum = real(0), lost = real(0), error;
                     for (const real term : terms) {
-                        const real next = sum + term, back = next - sum;
-                        lost += (sum - (next - back)) + (term - back);
-                        sum = next;
+                        sum = add_with_error(sum, term, error);
+                        lost += error;
                     }
                     const real defect = fabs(sum + lost);
                     if (defect < least) {
@@ -73,9 +73,7 @@ inline Status linear_map(typename K::Coefficients& k, typename K::real h) {
         if (!increment_of_step<K>(h, S, W0, k.Phi_minus_I)) return Status::singular_jacobian;
     }
     to_momentum<K>(k, k.Phi_minus_I);
-    real sum = real(0);
-    for (int i = 0; i < 2 * n * (2 * n + 1); ++i) sum += k.Phi_minus_I[i] - k.Phi_minus_I[i];
-    return sum == real(0) ? Status::ok : Status::not_finite;
+    return is_finite(not_finite_part(k.Phi_minus_I, 2 * n * (2 * n + 1))) ? Status::ok : Status::not_finite;
 }
 
 // (q1, p1) = (q, p) + E (q, p) + shift, E = Phi - I; E: 2n x (2n + 1), the shift its last column.
@@ -117,7 +115,6 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : ConstantMass<K> {
     // Of a few coordinates and more, the rows of Phi - I lie in lanes, column after column.
     static constexpr int width = native_lanes<real>, rows = (2 * n + width - 1) / width * width;
     static constexpr bool in_lanes = n >= 4 && width > 1;
-    struct Nothing {};
     real p[n]{};  // momentum
     std::conditional_t<in_lanes, real[(2 * n + 1) * rows], Nothing> columns{};
 
@@ -147,9 +144,7 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : ConstantMass<K> {
             propagate(columns, q1, p1);
         else
             K::propagate(coefficients, q, p, q1, p1);
-        real sum = real(0);
-        for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (p1[k] - p1[k]);
-        if (!(sum == real(0))) return Status::not_finite;
+        if (!is_finite(not_finite_part(q1, n) + not_finite_part(p1, n))) return Status::not_finite;
         for (int k = 0; k < n; ++k) {
             q[k] = q1[k];
             p[k] = p1[k];
@@ -197,42 +192,31 @@ struct Stepper<K, Form::linear_map, Stepping::solved> : ConstantMass<K> {
 };
 
 template <class K, class T>
-struct LaneStepper<K, T, Form::linear_map, Stepping::solved> {
-    using real = typename K::real;
-    using ActiveMask = decltype(T() < T());
-    static constexpr int n = K::coordinates;
-    T q[n], p[n], evaluations = T(real(0));
+struct LaneStepper<K, T, Form::linear_map, Stepping::solved> : LaneState<K, T, false> {
+    using State = LaneState<K, T, false>;
+    using State::n, State::q, State::rate;
+    using typename State::real, typename State::ActiveMask;
     struct Shared {};  // the map is of a trajectory's parameters
 
     Shared shared() const { return {}; }
     template <bool>
     LOBATTO_INLINE void take(const Shared&) {}
-    LOBATTO_DEVICE const T& position(int c) const { return q[c]; }
-    LOBATTO_DEVICE const T* rates() const { return p; }
 
     void prepare(const ScalarFallback<K>&, int) {}
     void set_tolerance(real) {}
-    void start(const ScalarFallback<K>& single, int lane) { follow(single, lane); }
-    void momentum(const ScalarFallback<K>&, int lane, real* momentum) const {
-        for (int c = 0; c < n; ++c) momentum[c] = lane_of(p[c], lane);
-    }
+    void start(const ScalarFallback<K>& single, int lane) { this->follow_state(single, lane); }
+    void refill(const ScalarFallback<K>& single, int lane) { this->follow_state(single, lane); }
+    void follow(const ScalarFallback<K>& single, int lane) { this->follow_state(single, lane); }
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step(const Given& k, const Time&, ActiveMask active) {
-        T q1[n], p1[n], not_finite = T(real(0));
-        K::propagate(k, q, p, q1, p1);
-        for (int c = 0; c < n; ++c) not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
-        active = active & (not_finite == T(real(0)));
+        T q1[n], p1[n];
+        K::propagate(k, q[0], rate[0], q1, p1);
+        active = active & (not_finite_part(q1, n) + not_finite_part(p1, n) == T(real(0)));
         for (int c = 0; c < n; ++c) {
-            q[c] = select(active, q1[c], q[c]);
-            p[c] = select(active, p1[c], p[c]);
+            q[0][c] = select(active, q1[c], q[0][c]);
+            rate[0][c] = select(active, p1[c], rate[0][c]);
         }
         return active;
-    }
-    void follow(const ScalarFallback<K>& single, int lane) {
-        for (int c = 0; c < n; ++c) {
-            set_lane(q[c], lane, single.q[c]);
-            set_lane(p[c], lane, single.p[c]);
-        }
     }
 };
 

@@ -12,7 +12,6 @@
 
 #include "ensemble.hpp"
 #include "events.hpp"
-#include "lent_steps.hpp"
 #include "watch.hpp"
 
 namespace lobatto {
@@ -41,7 +40,6 @@ struct LaneSamples {
     using T = Pack<real, width>;
     using ActiveMask = decltype(T() < T());
     using Motion = LaneStepper<K, T>;
-    using Step = LentStep<K, T>;
     using Sampled = Events<FallbackKernel<K>>;
     static constexpr int n = K::coordinates, basis = SamplePlaces<K>::basis, places = SamplePlaces<K>::places;
     static constexpr int pieces = Sampled::pieces;
@@ -53,7 +51,7 @@ struct LaneSamples {
     template <class Given>
     LOBATTO_LANE ActiveMask restless(const SamplePlaces<K>& at, const Motion& motion, const Given& k, const T& begun,
                                      const T& gone, real h, const T* q_before, const T* rate_before) {
-        Step::displacements(motion, k, begun + gone * T(h), q_before, rate_before, moved);
+        motion.displacements(k, begun + gone * T(h), q_before, rate_before, moved);
         T y[places][K::events];
         for (int i = 0; i < places; ++i) {
             T q[n], velocity[n];
@@ -68,11 +66,10 @@ struct LaneSamples {
             }
             Formulas<K>::event(k, begun + (gone + T(at.grid[i])) * T(h), q, velocity, y[i]);
         }
-        T q[n], velocity[n], end[K::events];
+        T velocity[n], end[K::events];
         const T next = begun + (gone + T(real(1))) * T(h);
-        for (int c = 0; c < n; ++c) q[c] = motion.position(c);
-        ActiveMask quiet = Step::velocities(motion, k, next, velocity);
-        Formulas<K>::event(k, next, q, velocity, end);
+        ActiveMask quiet = motion.velocities(k, next, velocity).have_converged;
+        Formulas<K>::event(k, next, motion.positions(), velocity, end);
         for (int e = 0; e < K::events; ++e) quiet = quiet & is_quiet(e, y, end[e]);
         return !quiet;
     }
@@ -94,7 +91,7 @@ private:
             const ActiveMask is_least = quiet & (y[i] <= y[i - 1]) & (y[i] < y[i + 1]);
             if (!any(is_least)) continue;
             if constexpr (pieces >= 4)
-                quiet = quiet & (!is_least | is_no_dip<pieces>(at, Sampled::piece_at(i), largest));
+                quiet = quiet & (is_no_dip<pieces>(at, Sampled::piece_at(i), largest) | !is_least);
             else
                 quiet = quiet & !is_least;
         }
@@ -158,10 +155,10 @@ struct RefilledEnsemble : Ensemble<K, width> {
     using Base::n, Base::lanes, Base::coefficients, Base::motion, Base::parameters, Base::coefficients_of, Base::single,
         Base::step_size, Base::steps;
     using typename Base::real, typename Base::T, typename Base::ActiveMask;
-    using Step = LentStep<K, T>;
     static constexpr int columns = 1 + 2 * n;
     static constexpr bool has_events = K::events > 0;
     using Looks = std::conditional_t<has_events, LaneWatch<K, width>, NoLaneWatch<K, width>>;
+    static constexpr int events_of_step = Looks::most;
 
     T begun, gone;  // the time at which each lane began, and its steps since then
     Looks looks;
@@ -186,31 +183,32 @@ struct RefilledEnsemble : Ensemble<K, width> {
         return status;
     }
 
-    // At most `count` steps of the lanes whose status is ok, until one of them ends. After each step a row of t, q, p
-    // of each, `capacity` rows a lane; events as of Watch, where there is room for them.
-    void advance(std::int64_t count, real tolerance, real* records, std::int64_t capacity, real* events,
-                 std::int64_t event_capacity, Status* status, std::int64_t* done, std::int64_t* iterations,
-                 std::int64_t* events_written) {
+    // At most call.steps of the lanes whose status is ok, until one of them ends. After each step a row of t, q, p of
+    // each, call.capacity rows a lane; events as of Watch, where there is room for them.
+    template <class Call>
+    void advance(const Call& call, Status* status) {
+        const real tolerance = static_cast<real>(call.tolerance);
+        real* const events = static_cast<real*>(call.events);
         motion.set_tolerance(tolerance);
         single.tolerance = tolerance;
         ActiveMask active = ActiveMask(false);
         for (int lane = 0; lane < width; ++lane) {
             active.set(lane, status[lane] == Status::ok);
-            done[lane] = events_written[lane] = 0;
+            call.steps_done[lane] = call.events_written[lane] = 0;
         }
         T evaluations = T(real(0));
         std::int64_t taken = 0;
         bool has_left = false;
         const auto leave = [&](int lane, Status why) {
             status[lane] = why;
-            done[lane] = taken;
+            call.steps_done[lane] = taken;
             active.set(lane, false);
             has_left = true;
         };
-        while (taken < count && taken < capacity && !has_left && any(active)) {
+        while (taken < call.steps && taken < call.capacity && !has_left && any(active)) {
             T q_before[n], rate_before[n];
             for (int c = 0; c < n; ++c) {
-                q_before[c] = motion.position(c);
+                q_before[c] = motion.positions()[c];
                 rate_before[c] = motion.rates()[c];
             }
             const T time = begun + gone * T(step_size), next = begun + (gone + T(real(1))) * T(step_size);
@@ -229,21 +227,22 @@ struct RefilledEnsemble : Ensemble<K, width> {
                         if (!restless[lane]) continue;
                         const Status found =
                             look(lane, q_before, rate_before, tolerance,
-                                 events + lane * event_capacity * Looks::columns, events_written[lane]);
+                                 events + lane * call.event_capacity * Looks::columns, call.events_written[lane]);
                         if (found != Status::ok) leave(lane, found);
                     }
                 }
             }
             gone = select(active, gone + T(real(1)), gone);
-            record(next, records + taken * columns, capacity * columns);
+            record(next, static_cast<real*>(call.records) + taken * columns, call.capacity * columns);
             ++taken;
             for (int lane = 0; lane < width; ++lane)
-                has_left = has_left || (events != nullptr && events_written[lane] + Looks::most > event_capacity);
+                has_left =
+                    has_left || (events != nullptr && call.events_written[lane] + Looks::most > call.event_capacity);
         }
         looks.rest();
         for (int lane = 0; lane < width; ++lane) {
-            if (status[lane] == Status::ok) done[lane] = taken;
-            iterations[lane] = static_cast<std::int64_t>(evaluations[lane]);
+            if (status[lane] == Status::ok) call.steps_done[lane] = taken;
+            call.iterations[lane] = static_cast<std::int64_t>(evaluations[lane]);
         }
     }
 
@@ -252,7 +251,7 @@ protected:
         coefficients_of[lane] = single.coefficients;
         set_coefficients<K>(coefficients, lane, single.coefficients);
         motion.prepare(single, lane);
-        Step::refill(motion, single, lane);
+        motion.refill(single, lane);
         looks.start(single, lane);
         begun.set(lane, time);
         gone.set(lane, real(0));
@@ -261,14 +260,9 @@ protected:
     // Into the rows of all lanes, `stride` apart.
     void record(const T& time, real* row, std::int64_t stride) const {
         T momentum[n];
-        Step::momenta(motion.rates(), coefficients, momentum);
-        for (int lane = 0; lane < width; ++lane, row += stride) {
-            row[0] = lane_of(time, lane);
-            for (int c = 0; c < n; ++c) {
-                row[1 + c] = lane_of(motion.position(c), lane);
-                row[1 + n + c] = lane_of(momentum[c], lane);
-            }
-        }
+        motion.momenta(motion.rates(), coefficients, momentum);
+        for (int lane = 0; lane < width; ++lane, row += stride)
+            put_state<n>(lane_of(time, lane), motion.positions(), momentum, row, lane);
     }
 
     Status look(int lane, const T* q_before, const T* rate_before, real tolerance, real* rows, std::int64_t& count) {
@@ -276,9 +270,9 @@ protected:
             to.tolerance = tolerance;
             to.start_time = lane_of(begun, lane);
             to.steps = static_cast<std::int64_t>(lane_of(gone, lane));
-            Step::lend_state(q_before, rate_before, to, lane);
+            motion.lend_state(q_before, rate_before, to, lane);
             watch.keep(to);
-            Step::lend_step(motion, looks.moved, to, lane);
+            motion.lend_step(looks.moved, to, lane);
             ++to.steps;
         };
         return looks.look(parameters[lane], step_size, lend, lane, rows, count);

@@ -9,17 +9,10 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "watched_stepper.hpp"
 
 namespace lobatto {
-
-template <class K>
-constexpr bool has_refractions() {
-    if constexpr (switches_of<K>() > 0)
-        return K::refractions > 0;
-    else
-        return false;
-}
 
 // A place u(t, q) = 0 at which L may jump, near a state.
 template <class K>
@@ -30,10 +23,7 @@ struct Surface {
     const real* slope{};  // du/dq; the rate is du/dt at fixed q
 
     Surface(const WatchedStepper<K>& stepper, int number, real time, const real* q) {
-        if constexpr (K::autonomous)
-            K::refraction(stepper.coefficients, q, +slopes, +rates);
-        else
-            K::refraction(stepper.coefficients, time, q, +slopes, +rates);
+        Formulas<K>::refraction(stepper.coefficients, time, q, +slopes, +rates);
         slope = slopes + K::refraction_of[number] * n;
         rate = rates[K::refraction_of[number]];
     }
@@ -46,10 +36,10 @@ struct Surface {
     }
     // What a rounding of the time and of positions, or of their ways in a step, does to u.
     real rounding(real time, const real* q, const real* velocity, real step) const {
-        real sum = fabs(rate) * (fabs(time) > fabs(step) ? fabs(time) : fabs(step));
+        real sum = fabs(rate) * maximum(fabs(time), fabs(step));
         for (int c = 0; c < n; ++c) {
             const real way = fabs(velocity[c] * step);
-            sum += fabs(slope[c]) * (fabs(q[c]) > way ? fabs(q[c]) : way);
+            sum += fabs(slope[c]) * maximum(fabs(q[c]), way);
         }
         return real(64) * Limits<real>::epsilon * sum;
     }
@@ -79,7 +69,7 @@ public:
         before = stepper.energy(time, q, p, &energy);
         real velocity[n];
         if (before == Status::ok) before = stepper.velocity(time, q, p, velocity);
-        for (int i = 0; i < switches_of<K>() && before == Status::ok; ++i)
+        for (int i = 0; i < K::switches && before == Status::ok; ++i)
             changes[i] = i == number || (K::refraction_of[i] >= 0 && fabs(value[i]) <= slack[i] &&
                                          is_crossed_beside(Surface<K>(at, i, t, position), i, velocity, slack[i]));
     }
@@ -128,7 +118,7 @@ private:
         for (int c = 0; c < n; ++c) trial.p[c] = p[c] + mu * surface.slope[c];
         real here{};
         Status status = stepper.velocity(time, q, trial.p, trial.velocity);
-        if (constraints_of<K>() > 0 && status == Status::ok) stepper.momentum(time, q, trial.velocity, trial.p);
+        if (K::constraints > 0 && status == Status::ok) stepper.momentum(time, q, trial.velocity, trial.p);
         if (status == Status::ok) status = stepper.energy(time, q, trial.p, &here);
         trial.excess = here - energy + mu * surface.rate;
         trial.speed = surface.speed(trial.velocity);
@@ -190,7 +180,7 @@ private:
     }
 
     void change_side() {
-        for (int i = 0; i < switches_of<K>(); ++i)
+        for (int i = 0; i < K::switches; ++i)
             if (changes[i]) stepper.side(i) = -stepper.side(i);
         K::prepare(stepper.parameters, stepper.step_size, stepper.coefficients);
     }
@@ -198,7 +188,7 @@ private:
     S& stepper;
     const Surface<K> surface;
     const real side;
-    bool changes[switches_of<K>()]{};
+    bool changes[K::switches]{};
     real time;
     const real *q, *p;
     real energy{}, size{}, least{};

@@ -75,7 +75,7 @@ struct SampledFunction {
     // or where it jumps: that is a root if it `may_jump`, beyond the jump.
     template <class G>
     static real root_between(Sample a, Sample b, bool may_jump, bool& is_root, const G& g) {
-        const real largest = fabs(a.value) < fabs(b.value) ? fabs(b.value) : fabs(a.value);
+        const real largest = maximum(fabs(b.value), fabs(a.value));
         const real change = fabs(b.value - a.value);
         const bool may_tell = b.theta - a.theta > real(16) * rounding;
         Sample nearest = fabs(a.value) < fabs(b.value) ? a : b;

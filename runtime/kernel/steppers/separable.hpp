@@ -18,15 +18,6 @@
 
 namespace lobatto {
 
-// Whether iterations have neighbouring coordinates in lanes, not nodes.
-template <class K>
-constexpr bool along_coordinates() {
-    if constexpr (K::any_number && !K::linear)
-        return K::neighbours;
-    else
-        return false;
-}
-
 template <class K>
 struct Stepper<K, Form::separable, Stepping::solved> : VelocityKept<K> {
     using typename VelocityKept<K>::real;
@@ -39,9 +30,8 @@ struct Stepper<K, Form::separable, Stepping::solved> : VelocityKept<K> {
     using Stages = StageEquations<K>;
     using Newton = NewtonIteration<K>;
     static constexpr bool has_fixed_point = N > 0 && K::any_number && !K::linear && !K::clean;
-    static constexpr bool along_coordinates = has_fixed_point && lobatto::along_coordinates<K>();
+    static constexpr bool along_coordinates = has_fixed_point && K::neighbours;  // in lanes, not nodes
 
-    struct Nothing {};
     struct Arrays : Newton::Arrays {
         real q1[n], u1[n], W1[n];  // the end of the step
     };
@@ -284,8 +274,8 @@ private:
         stages.arrive(a.base, a.W, a.q1);
         Formulas<K>::minus_acceleration(coefficients, this->next_time(), a.q1, a.W1);
         stages.finish(a.v, a.W, a.W1, a.u1);
-        const real sum = not_finite_part(a.q1, n) + not_finite_part(a.u1, n) + not_finite_part(a.W1, n);
-        if (!(sum == real(0))) return Status::not_finite;
+        if (!is_finite(not_finite_part(a.q1, n) + not_finite_part(a.u1, n) + not_finite_part(a.W1, n)))
+            return Status::not_finite;
         for (int k = 0; k < n; ++k) {
             q_before[k] = q[k];
             u_before[k] = u[k];

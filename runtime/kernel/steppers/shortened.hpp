@@ -16,12 +16,7 @@ template <class T>
 struct LongTime {
     T time{}, rest{};
 
-    void add(const T& part) {
-        const T wanted = part + rest, sum = time + wanted;
-        const T added = sum - time;
-        rest = (time - (sum - added)) + (wanted - added);
-        time = sum;
-    }
+    void add(const T& part) { time = add_with_error(time, part + rest, rest); }
     // What is missing to `target`.
     T until(const T& target) const { return (target - time) - rest; }
 };
@@ -34,14 +29,14 @@ struct ShortenedStep {
     using ActiveMask = decltype(T() < T());
     static constexpr int n = K::coordinates, r = K::nodes, trial_limit = 60;
 
-    std::conditional_t<iterates, GalerkinFixedPoint<K, T>, Unit> iteration;
+    std::conditional_t<iterates, GalerkinFixedPoint<K, T>, Nothing> iteration;
     T q[n]{}, p[n]{}, elapsed{};   // of a trial
     T found_q[n]{}, found_p[n]{};  // the ends that were found
 
     // theta with t(theta h) = wanted, t monotone: Newton's iteration with dt/dtau = g, kept between two bounds. `step`
     // has taken the whole step, in the time `whole`; alone(theta): whether a trial by other means went well. The lanes
     // whose end is found.
-    template <class Step, class Alone = Unit>
+    template <class Step, class Alone = Nothing>
     ActiveMask find(const Step& step, const T& wanted, const T& whole, ActiveMask active, const Alone& alone = {}) {
         const T h = T(step.step_size);
         T low = T(real(0)), high = T(real(1)), change = T(real(1)), theta = theta_of(step, wanted / h, wanted / whole);

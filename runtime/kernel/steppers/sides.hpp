@@ -7,6 +7,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "refraction.hpp"
 #include "walls.hpp"
 
@@ -22,13 +23,13 @@ struct Sides {
     // Of each switch where a state is; at a place where L jumps, the one from which the motion comes. A switch may hold
     // the sides of those before it.
     static void take_at(S& stepper, real time, const real* q, const real* velocity) {
-        for (int tries = 0; tries <= switches_of<K>(); ++tries) {
+        for (int tries = 0; tries <= K::switches; ++tries) {
             bool changes = tries == 0;
             real values[K::events];
             Formulas<K>::event(stepper.coefficients, time, q, velocity, values);
-            for (int i = 0; i < switches_of<K>(); ++i) {
-                real value = values[K::events - switches_of<K>() + i];
-                if constexpr (has_refractions<K>()) value = where_it_comes_from(stepper, i, value, time, q, velocity);
+            for (int i = 0; i < K::switches; ++i) {
+                real value = values[K::events - K::switches + i];
+                if constexpr (K::refractions > 0) value = where_it_comes_from(stepper, i, value, time, q, velocity);
                 const real side = value > real(0) ? real(1) : real(-1);
                 changes = changes || side != stepper.side(i);
                 stepper.side(i) = side;
@@ -46,7 +47,7 @@ struct Sides {
     }
     // The velocity is that of the sides so far.
     static void take(S& stepper, real time, const real* q, const real* p) {
-        if constexpr (switches_of<K>() > 0) {
+        if constexpr (K::switches > 0) {
             real velocity[n];
             if (stepper.velocity(time, q, p, velocity) == Status::ok) take_at(stepper, time, q, velocity);
         }
@@ -56,9 +57,9 @@ struct Sides {
         Walls<K> wall;
         for (real& scale : stepper.wall_scale) scale = real(0);
         for (real& size : stepper.scaled_at) size = real(0);
-        if constexpr (switches_of<K>() > 0) scale_switches(stepper, time, q, p);
+        if constexpr (K::switches > 0) scale_switches(stepper, time, q, p);
         Status status = wall.look(stepper, time, q, p);
-        wall.take_passages(stepper, true);
+        wall.begin_passages(stepper);
         if (status == Status::ok && wall.is_behind()) {
             wall.forgive_rounding(stepper);
             status = wall.look(stepper, time, q, p);
@@ -70,7 +71,7 @@ struct Sides {
     // Where that is known of an earlier place, anew if one of them has grown to more than twice of what it was there;
     // or `again`, because the slopes were small there, as where u is largest.
     static void scale_switches(S& stepper, real time, const real* q, const real* p, bool again = false) {
-        real x[1 + 2 * n] = {time}, here[K::events], there[K::events], scale[switches_of<K>()] = {};
+        real x[1 + 2 * n] = {time}, here[K::events], there[K::events], scale[K::switches] = {};
         for (int k = 0; k < n; ++k) x[1 + k] = q[k];
         if (stepper.velocity(time, q, p, x + 1 + n) != Status::ok) return;
         bool has_grown = false;
@@ -83,14 +84,13 @@ struct Sides {
             moved += Limits<real>::root_epsilon * moved;
             Formulas<K>::event(stepper.coefficients, x[0], x + 1, x + 1 + n, there);
             moved = kept;
-            for (int i = 0; i < switches_of<K>(); ++i) {
-                const real change =
-                    fabs(there[K::events - switches_of<K>() + i] - here[K::events - switches_of<K>() + i]);
+            for (int i = 0; i < K::switches; ++i) {
+                const real change = fabs(there[K::events - K::switches + i] - here[K::events - K::switches + i]);
                 if (is_finite(change)) scale[i] += change / Limits<real>::root_epsilon;
             }
         }
-        for (int i = 0; i < switches_of<K>(); ++i)
-            if (scale[i] > stepper.wall_scale[impacts_of<K>() + i]) stepper.wall_scale[impacts_of<K>() + i] = scale[i];
+        for (int i = 0; i < K::switches; ++i)
+            stepper.wall_scale[K::impacts + i] = maximum(scale[i], stepper.wall_scale[K::impacts + i]);
     }
     static Status start(S& stepper, real time, const real* q, const real* p) {
         take(stepper, time, q, p);
@@ -103,7 +103,7 @@ struct Sides {
         real q[n], p[n];
         for (int k = 0; k < n; ++k) q[k] = stepper.q[k];
         stepper.momentum(p);
-        if constexpr (switches_of<K>() > 0) {
+        if constexpr (K::switches > 0) {
             take(stepper, time, q, p);
             const KnownEvents<S> known(stepper);
             const Status status = stepper.restart(q, p, stepper.steps);

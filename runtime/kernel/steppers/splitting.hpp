@@ -14,6 +14,7 @@
 #include "../base/numbers.hpp"
 #include "../base/pack.hpp"
 #include "../base/rows.hpp"
+#include "../iteration/lane_state.hpp"
 #include "../iteration/tangent.hpp"
 
 namespace lobatto {
@@ -191,15 +192,6 @@ private:
     }
 };
 
-template <class K, bool along_neighbours>
-struct NeighbourCompositionOf {
-    using type = NeighbourComposition<K>;
-};
-template <class K>
-struct NeighbourCompositionOf<K, false> {
-    struct type {};
-};
-
 template <class K>
 struct Stepper<K, Form::separable, Stepping::composition> : VelocityKept<K> {
     using typename VelocityKept<K>::real;
@@ -214,14 +206,13 @@ struct Stepper<K, Form::separable, Stepping::composition> : VelocityKept<K> {
         std::int64_t of{-1};  // this many steps since start; -1: not computed
         real W[2][n]{};
     };
-    using Nothing = typename NeighbourCompositionOf<K, false>::type;
 
     Composition<K> composition{};
     real W[n]{};                        // M^-1 grad V at q, where ends are kicked; not of neighbours
     real q_before[n]{}, u_before[n]{};  // before the last step; likewise
     bool has_history{};                 // what lies between the ends of the last step is known
     mutable Ends ends{};
-    typename NeighbourCompositionOf<K, K::neighbours>::type neighbours{};
+    std::conditional_t<K::neighbours, NeighbourComposition<K>, Nothing> neighbours{};
 
     Status prepare(const typename K::Parameters& parameters, real h) {
         step_size = h;
@@ -326,15 +317,14 @@ struct Stepper<K, Form::separable, Stepping::composition> : VelocityKept<K> {
 
 private:
     bool move(Nothing&) {
-        real q1[n], u1[n], W1[n], sum = real(0);
+        real q1[n], u1[n], W1[n];
         for (int k = 0; k < n; ++k) {
             q1[k] = q[k];
             u1[k] = u[k];
             W1[k] = W[k];
         }
         kick_and_drift<K>(composition, coefficients, this->time(), step_size, q1, u1, W1);
-        for (int k = 0; k < n; ++k) sum += (q1[k] - q1[k]) + (u1[k] - u1[k]);
-        if (!(sum == real(0))) return false;
+        if (!is_finite(not_finite_part(q1, n) + not_finite_part(u1, n))) return false;
         for (int k = 0; k < n; ++k) {
             q_before[k] = q[k];
             u_before[k] = u[k];
@@ -376,12 +366,11 @@ private:
 };
 
 template <class K, class T>
-struct LaneStepper<K, T, Form::separable, Stepping::composition> {
-    using real = typename K::real;
-    using ActiveMask = decltype(T() < T());
-    static constexpr int n = K::coordinates;
-    int now{};  // the present; 1 - now: room for the next
-    T q[2][n], u[2][n], W[2][n], evaluations = T(real(0));
+struct LaneStepper<K, T, Form::separable, Stepping::composition> : LaneState<K, T, true, 2> {
+    using State = LaneState<K, T, true, 2>;
+    using State::n, State::q, State::now;
+    using typename State::real, typename State::ActiveMask;
+    T W[2][n];
     Composition<K> composition;
     real h;
     struct Shared {  // by all trajectories of one step size
@@ -395,24 +384,19 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
         composition = all.composition;
         h = all.h;
     }
-    LOBATTO_DEVICE const T& position(int c) const { return q[now][c]; }
-    LOBATTO_DEVICE const T* rates() const { return u[now]; }
     void prepare(const ScalarFallback<K>& single, int) {
         composition = single.composition;
         h = single.step_size;
     }
     void set_tolerance(real) {}
     void start(const ScalarFallback<K>& single, int lane) { follow(single, lane); }
-    void momentum(const ScalarFallback<K>& single, int lane, real* momentum) const {
-        real velocity[n];
-        for (int c = 0; c < n; ++c) velocity[c] = lane_of(u[now][c], lane);
-        K::momentum(single.coefficients, velocity, momentum);
-    }
+    void refill(const ScalarFallback<K>& single, int lane) { follow(single, lane); }
     template <class Given, class Time>
     LOBATTO_LANE ActiveMask step(const Given& k, const Time& time, ActiveMask active) {
         const int next = 1 - now;
+        auto& u = this->rate;
         T not_finite = T(real(0));
-        if constexpr (moves_immediately<K>()) {
+        if constexpr (K::immediate) {
             immediate_step<K>(composition, k, time, q[now], u[now], W[now], q[next], u[next], W[next]);
             for (int c = 0; c < n; ++c) not_finite = fused(T(real(0)), q[next][c] + u[next][c], not_finite);
         } else {
@@ -441,11 +425,28 @@ struct LaneStepper<K, T, Form::separable, Stepping::composition> {
         return active;
     }
     void follow(const ScalarFallback<K>& single, int lane) {
+        this->follow_state(single, lane);
+        for (int c = 0; c < n; ++c) set_lane(W[now][c], lane, single.minus_acceleration(c));
+    }
+
+    template <class Given>
+    LOBATTO_LANE void displacements(const Given& k, const T& time, const T* q_before, const T* u_before,
+                                    T (*moved)[n]) const {
+        T start[n], end[n];
+        Formulas<K>::minus_acceleration(k, time, q_before, start);
+        Formulas<K>::minus_acceleration(k, time + T(h), this->positions(), end);
         for (int c = 0; c < n; ++c) {
-            set_lane(q[now][c], lane, single.q[c]);
-            set_lane(u[now][c], lane, single.u[c]);
-            set_lane(W[now][c], lane, single.minus_acceleration(c));
+            moved[0][c] = q[now][c] - q_before[c];
+            moved[1][c] = T(h) * u_before[c];
+            moved[2][c] = T(h) * this->rate[now][c];
+            moved[3][c] = T(h) * (T(h) * start[c]);
+            moved[4][c] = T(h) * (T(h) * end[c]);
         }
+    }
+    template <class Single>
+    void lend_step(const T (*)[n], Single& single, int lane) const {
+        this->lend_end(single, lane);
+        single.ends.of = -1;
     }
 };
 

@@ -8,6 +8,7 @@
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "watched_stepper.hpp"
 
 namespace lobatto {
@@ -43,7 +44,7 @@ struct Walls {
         if constexpr (impacts > 0) look_at_impacts(stepper);
         for (int w = 0; w < count; ++w) {
             real& scale = stepper.wall_scale[w];
-            if (w >= impacts && fabs(value[first + w]) > scale) scale = fabs(value[first + w]);
+            if (w >= impacts) scale = maximum(fabs(value[first + w]), scale);
             slack[w] = few * scale;
         }
         return Status::ok;
@@ -55,25 +56,21 @@ struct Walls {
         return w < impacts ? real(-K::event_direction[first + w]) : stepper.side(w - impacts);
     }
     static bool passes(int w) {
-        if constexpr (has_passages<K>()) return w < impacts && K::passage_of[w] != 0;
+        if constexpr (K::passages > 0) return w < impacts && K::passage_of[w] != 0;
         return false;
     }
     // Whether a crossing that leads away from this side gives the motion a new state.
     static bool acts(int w, real from) {
-        if constexpr (has_passages<K>()) return K::passage_of[w] == 2 || real(K::passage_of[w]) * from < real(0);
+        if constexpr (K::passages > 0) return K::passage_of[w] == 2 || real(K::passage_of[w]) * from < real(0);
         return true;
     }
-    // On the side of a passage from which the motion comes, or to which it goes, where it is right there.
-    void take_passages(S& stepper, bool comes, int only = -1) {
-        for (int w = 0; w < impacts; ++w) {
-            if (!passes(w) || (only >= 0 && w != only)) continue;
-            const real here = value[first + w], after = along[w] != real(0) ? along[w] : here,
-                       sign = fabs(here) > slack[w] ? here
-                              : comes               ? -after
-                                                    : after;
-            stepper.passage_side[w] = sign < real(0) ? real(-1) : real(1);
-        }
+    // On which side of each passage the motion is; of one where it is right there, from which it comes.
+    void begin_passages(S& stepper) const {
+        for (int w = 0; w < impacts; ++w)
+            if (passes(w)) set_passage(stepper, w, -beyond(w));
     }
+    // On which side of this passage it goes on.
+    void go_beyond(S& stepper, int w) const { set_passage(stepper, w, beyond(w)); }
     bool is_behind(int w) const { return value[first + w] * real(-K::event_direction[first + w]) < -slack[w]; }
     bool is_behind() const {  // of one of the impacts
         for (int w = 0; w < impacts; ++w)
@@ -91,7 +88,7 @@ struct Walls {
         if (status != Status::ok) return status;
         const real impulse = -(real(1) + restitution[w]) * approach[w] * side(stepper, w) / mobility;
         if (!is_finite(impulse)) return Status::not_finite;
-        if constexpr (constraints_of<K>() > 0) {
+        if constexpr (K::constraints > 0) {
             for (int c = 0; c < n; ++c) velocity[c] += impulse * change[c];
             stepper.momentum(time, q, velocity, p);
         } else {
@@ -110,7 +107,7 @@ struct Walls {
         stepper.momentum(time, q, q, moved);
         for (int c = 0; c < n; ++c) {
             size += q[c] * (moved[c] - rest[c]) + h * h * velocity[c] * (p[c] - rest[c]);
-            for (const real far : {fabs(q[c]), fabs(h * velocity[c])}) farthest = far > farthest ? far : farthest;
+            farthest = maximum(fabs(h * velocity[c]), maximum(fabs(q[c]), farthest));
         }
         for (int w = 0; w < impacts; ++w) {
             const real depth = fabs(value[first + w]);
@@ -136,13 +133,19 @@ struct Walls {
     }
 
 private:
+    real beyond(int w) const { return along[w] != real(0) ? along[w] : value[first + w]; }
+    // `there`: the sign where the motion is right there.
+    void set_passage(S& stepper, int w, real there) const {
+        const real sign = fabs(value[first + w]) > slack[w] ? value[first + w] : there;
+        stepper.passage_side[w] = sign < real(0) ? real(-1) : real(1);
+    }
     // The sides of a state to which the motion has jumped; where it lies on a switch, as before. A switch may hold the
     // sides of those before it.
     void cross_switches(S& stepper, const real* position, const real* speed) {
-        for (int tries = 0; tries < switches_of<K>(); ++tries) {
+        for (int tries = 0; tries < K::switches; ++tries) {
             bool crosses = false;
             Formulas<K>::event(stepper.coefficients, time, position, speed, value);
-            for (int i = 0; i < switches_of<K>(); ++i) {
+            for (int i = 0; i < K::switches; ++i) {
                 const real there = value[first + impacts + i] * stepper.side(i);
                 if (!(there < -slack[impacts + i])) continue;
                 stepper.side(i) = -stepper.side(i);
@@ -171,15 +174,15 @@ private:
     void look_at_impacts(S& stepper) {
         Formulas<K>::impact(stepper.coefficients, time, q, gradient, rate, restitution, slow);
         for (int w = 0; w < impacts; ++w) {
-            const real step = fabs(stepper.step_size), passed = fabs(time) > step ? fabs(time) : step;
+            const real step = fabs(stepper.step_size), passed = maximum(fabs(time), step);
             real sum = rate[w], speed = fabs(rate[w]), moved = speed * passed;
             for (int c = 0; c < n; ++c) {
                 const real slope = gradient[w * n + c], way = fabs(velocity[c] * stepper.step_size);
                 sum += slope * velocity[c];
                 speed += fabs(slope * velocity[c]);
-                moved += fabs(slope) * (fabs(q[c]) > way ? fabs(q[c]) : way);
+                moved += fabs(slope) * maximum(fabs(q[c]), way);
             }
-            if (moved > stepper.wall_scale[w]) stepper.wall_scale[w] = moved;
+            stepper.wall_scale[w] = maximum(moved, stepper.wall_scale[w]);
             along[w] = fabs(sum) <= few * speed ? real(0) : sum;
             approach[w] = along[w] * side(stepper, w);
         }

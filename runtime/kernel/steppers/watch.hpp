@@ -23,8 +23,8 @@ public:
     using real = typename K::real;
     using S = WatchedStepper<K>;
     static constexpr int n = K::coordinates, columns = Events<K>::columns;
-    static constexpr int walls = S::walls, first_wall = K::events - walls, stops = stops_of<K>();
-    static constexpr bool goes_back = !is_clocked<K>;
+    static constexpr int walls = S::walls, first_wall = K::events - walls, stops = K::stops;
+    static constexpr bool goes_back = !K::clocked;
     static constexpr int most_impacts = walls > 0 ? 100 : 0;                             // in one step
     static constexpr int most = Events<K>::most + most_impacts * (1 + Events<K>::most);  // rows of one step
 
@@ -96,7 +96,7 @@ private:
     }
     // A state at one of the stepper's own times, with its parameters.
     static void put(S& stepper, const real* position, const real* momentum, std::int64_t steps) {
-        if constexpr (switches_of<K>() > 0) stepper.prepare(stepper.parameters, stepper.step_size);
+        if constexpr (K::switches > 0) stepper.prepare(stepper.parameters, stepper.step_size);
         stepper.restart(position, momentum, steps);
     }
 
@@ -130,7 +130,7 @@ private:
             const KnownEvents<S> known(*step);
             real row[1 + 2 * n];
             status = events.state(theta, row);
-            if constexpr (switches_of<K>() > 0)
+            if constexpr (K::switches > 0)
                 if (status == Status::ok)  // again at the second, third, fifth, ninth cut of a step
                     Sides<K>::scale_switches(stepper, row[0], row + 1, row + 1 + n,
                                              impacts > 0 && (impacts & (impacts - 1)) == 0);
@@ -171,30 +171,26 @@ private:
                     continue;
                 stop = s;
                 count = rows;
-                row[0] = wall.time;
-                for (int c = 0; c < n; ++c) {
-                    row[1 + c] = wall.q[c];
-                    row[1 + n + c] = wall.p[c];
-                }
+                put_state<n>(wall.time, wall.q, wall.p, row);
             }
         }
     };
 
     // Whether L may jump at wall w, a switch.
     static bool refracts(int w) {
-        if constexpr (has_refractions<K>()) return w >= impacts_of<K>() && K::refraction_of[w - impacts_of<K>()] >= 0;
+        if constexpr (K::refractions > 0) return w >= K::impacts && K::refraction_of[w - K::impacts] >= 0;
         return false;
     }
     // At kicks and refractions: a state right there is the one before, so that the next step begins with them.
     static bool changes_state(int w) { return Walls<K>::passes(w) || refracts(w); }
     // Whether the state jumps at wall w.
     static bool throws(S& stepper, int w) {
-        return w < impacts_of<K>() && (!Walls<K>::passes(w) || Walls<K>::acts(w, Walls<K>::side(stepper, w)));
+        return w < K::impacts && (!Walls<K>::passes(w) || Walls<K>::acts(w, Walls<K>::side(stepper, w)));
     }
 
     // Through a switch, or back from walls.
     Status pass(S& stepper, Walls<K>& wall, int number, real* rows, std::int64_t& count) {
-        if constexpr (impacts_of<K>() > 0) {
+        if constexpr (K::impacts > 0) {
             if (throws(stepper, number)) return meet(stepper, wall, number, rows, count);
         }
         (void)wall, (void)rows, (void)count;
@@ -203,12 +199,12 @@ private:
             stepper.passage_side[number] = -stepper.passage_side[number];
             return Status::ok;
         }
-        const int number_of_switch = number - impacts_of<K>();
-        if constexpr (has_refractions<K>()) {
+        const int number_of_switch = number - K::impacts;
+        if constexpr (K::refractions > 0) {
             if (K::refraction_of[number_of_switch] >= 0) {
                 real momentum[n];
                 Refraction<K> refraction(stepper, number_of_switch, wall.time, wall.q, wall.p,
-                                         wall.value + first_wall + impacts_of<K>(), wall.slack + impacts_of<K>());
+                                         wall.value + first_wall + K::impacts, wall.slack + K::impacts);
                 const Status status = refraction.pass(momentum);
                 return status == Status::ok ? wall.look(stepper, wall.time, wall.q, momentum) : status;
             }
@@ -223,7 +219,7 @@ private:
     Status meet(S& stepper, Walls<K>& wall, int first, real* rows, std::int64_t& count) {
         for (int last = -1;;) {
             int met = last < 0 && K::reset_of[first] >= 0 ? first : -1;
-            for (int w = 0; w < impacts_of<K>() && met < 0; ++w)
+            for (int w = 0; w < K::impacts && met < 0; ++w)
                 if ((wall.is_met(w) && (last < 0 || !wall.comes_to_rest(w))) ||
                     (last < 0 && w == first && wall.approach[w] < real(0)))
                     met = w;
@@ -236,15 +232,11 @@ private:
             last = lies ? first : met;
             const Status status = lies ? Status::ok : wall.hit(stepper, last);
             if (status != Status::ok) return status;
-            if (Walls<K>::passes(last)) wall.take_passages(stepper, false, last);
+            if (Walls<K>::passes(last)) wall.go_beyond(stepper, last);
             if (rows == nullptr) continue;
             real* const row = rows + count++ * columns;
             row[0] = real(first_wall + last);
-            row[1] = wall.time;
-            for (int k = 0; k < n; ++k) {
-                row[2 + k] = wall.q[k];
-                row[2 + n + k] = wall.p[k];
-            }
+            put_state<n>(wall.time, wall.q, wall.p, row + 1);
             if (lies) return Status::stopped;
         }
     }

@@ -4,10 +4,10 @@
 // K::events functions are watched: first events, then the K::stops, which end the motion, then walls (walls.hpp). The
 // motion stays on one side of a wall until it meets it; a value that is only rounding counts as zero. K::impacts walls
 // throw the motion back. The last K::switches walls change its formulas; their sides, 1 or -1, are the last parameters.
-// impact(k, q, G, g_t, e, rest) gives dg/dq, dg/dt at fixed q and the restitution of each wall, and the speed below
-// which the motion comes to rest there and ends. Where reset_of[] of it is not below 0, reset(k, q, velocity, q1,
-// velocity1) gives the state after that one of the K::resets. Where passage_of[] is not 0, the motion passes: its reset
-// is for crossings with g rising (1), falling (-1) or both (2). K::passages is how many these are.
+// impact(k, q, G, g_t, e, rest) gives dg/dq, dg/dt at fixed q and the restitution of each wall w, and the speed below
+// which the motion comes to rest there and ends. If reset_of[w] >= 0, reset(k, q, velocity, q1, velocity1) gives the
+// state after it, that one of the K::resets. If passage_of[w] is not 0, the motion passes: its reset is for crossings
+// with g rising (1), falling (-1) or both (2). K::passages is how many these are.
 #ifndef LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 #define LOBATTO_KERNEL_WATCHED_STEPPER_HPP
 
@@ -23,7 +23,7 @@ struct Between {
     static constexpr int n = K::coordinates, columns = 1 + 2 * n;
 
     static real time(const S& stepper, real theta) {
-        if constexpr (is_clocked<K>)
+        if constexpr (K::clocked)
             return stepper.time_within(theta);
         else
             return stepper.start_time + (real(stepper.steps - 1) + theta) * stepper.step_size;
@@ -41,43 +41,12 @@ struct Between {
     }
 };
 
-// The functions at the end of those that are watched: of walls, and before them of stops.
-template <class K>
-constexpr int impacts_of() {
-    if constexpr (K::events > 0)
-        return K::impacts;
-    else
-        return 0;
-}
-template <class K>
-constexpr bool has_passages() {
-    if constexpr (impacts_of<K>() > 0)
-        return K::passages > 0;
-    else
-        return false;
-}
-template <class K>
-constexpr int stops_of() {
-    if constexpr (K::events > 0)
-        return K::stops;
-    else
-        return 0;
-}
-
-template <class K>
-constexpr int switches_of() {
-    if constexpr (K::events > 0)
-        return K::switches;
-    else
-        return 0;
-}
-
 // A stepper that knows its parameters, for steps of other lengths.
 template <class K>
 struct WatchedStepper : Stepper<K> {
     using real = typename K::real;
     typename K::Parameters parameters{};
-    static constexpr int walls = impacts_of<K>() + switches_of<K>(), wall_room = walls > 0 ? walls : 1;
+    static constexpr int walls = K::impacts + K::switches, wall_room = walls > 0 ? walls : 1;
     real wall_scale[wall_room]{};              // the most that went into each wall's function so far
     real scaled_at[1 + 2 * K::coordinates]{};  // the time, positions and velocities, as large, that this is known of
     real passage_side[wall_room]{};            // of walls that let the motion pass: the sign of g where it is
@@ -94,7 +63,7 @@ struct WatchedStepper : Stepper<K> {
     }
 
     // The side of a switch: 1 or -1.
-    real& side(int number) { return K::parameter(parameters, K::parameter_count - switches_of<K>() + number); }
+    real& side(int number) { return K::parameter(parameters, K::parameter_count - K::switches + number); }
 };
 
 // What was last known of the events of a motion that goes on in another stepper, or in this one after a restart.

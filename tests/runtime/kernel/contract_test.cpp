@@ -81,7 +81,12 @@ TEST_CASE("emitted kernels of every form fulfil the contract" * doctest::test_su
                                                                    {"wave_chain", splitting},
                                                                    {"stiff_fput", lobatto_4},
                                                                    {"kapitza_pendulum", lobatto_4},
-                                                                   {"triple_pendulum", gauss_3}};
+                                                                   {"triple_pendulum", gauss_3},
+                                                                   {"rod_pendulum", lobatto_4},
+                                                                   {"quaternion_top", lobatto_4},
+                                                                   {"pythagorean", lobatto_4},
+                                                                   {"bouncing_ball", lobatto_4},
+                                                                   {"flips", lobatto_4}};
     for (const auto& row : rows) {
         INFO(row.first << " " << row.second);
         CHECK(complaints(row.first, row.second) == "");

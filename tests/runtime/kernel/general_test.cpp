@@ -106,14 +106,11 @@ struct Relativistic : HandwrittenKernel, LobattoFour<double> {
     using real = double;
     static constexpr int coordinates = 1;
     static constexpr Form form = Form::general;
-    static constexpr bool clocked = false;
-    static constexpr bool autonomous = true, linear = false;
+    static constexpr bool autonomous = true;
     static constexpr int active = 1, cyclic = 0, active_index[1] = {0}, cyclic_index[1] = {0};
     static constexpr int position[1] = {0}, group_count = 1, group_first[2] = {0, 1}, group_bandwidth[1] = {0};
     static constexpr int entries = 1, entry_row[1] = {0}, entry_column[1] = {0};
     static constexpr int mass_entries = 1, mass_row[1] = {0}, mass_column[1] = {0};
-    static constexpr bool constant_mass = false, hamiltonian = false;
-    static constexpr int constraints = 0, constraint_entries = 0, constraint_row[1] = {0}, constraint_column[1] = {0};
     struct Parameters {};
     struct Coefficients {};
     static Status prepare(const Parameters&, real, Coefficients&) { return Status::ok; }

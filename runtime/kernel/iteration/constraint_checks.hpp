@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Whether a start keeps the constraints, and the end of a step that Newton's iteration has taken.
-#ifndef LOBATTO_KERNEL_GALERKIN_CONSTRAINTS_HPP
-#define LOBATTO_KERNEL_GALERKIN_CONSTRAINTS_HPP
+// Checks that a start keeps the constraints, and the end of a step that Newton's iteration has taken.
+#ifndef LOBATTO_KERNEL_CONSTRAINT_CHECKS_HPP
+#define LOBATTO_KERNEL_CONSTRAINT_CHECKS_HPP
 
 #include "../base/contract.hpp"
 #include "../base/numbers.hpp"
+#include "../base/pack.hpp"
 #include "constraint_rounding.hpp"
 #include "galerkin_newton.hpp"
 
 namespace lobatto {
 
 template <class K>
-struct GalerkinConstraints : GalerkinNewton<K> {
+struct ConstraintChecks : GalerkinNewton<K> {
     using Newton = GalerkinNewton<K>;
     using Newton::n, Newton::active, Newton::constraints, Newton::Z, Newton::r, Newton::coefficients, Newton::step_size,
         Newton::q, Newton::p;
@@ -71,8 +72,8 @@ protected:
             real largest = real(0), apart = real(0), pushed = real(0), Lv[n], Lq[n];
             Formulas<K>::slopes(coefficients, this->time(), q, v, Lv, Lq);
             for (int k = 0; k < n; ++k) {
-                largest = fabs(p[k]) > largest ? fabs(p[k]) : largest;
-                apart = fabs(force[k]) > apart ? fabs(force[k]) : apart;
+                largest = maximum(fabs(p[k]), largest);
+                apart = maximum(fabs(force[k]), apart);
                 pushed = maximum(pushed, fabs(longest_step * Lq[k]));
             }
             const real rounding = real(64) * Limits<real>::epsilon * pushed;  // at rest steps leave that
