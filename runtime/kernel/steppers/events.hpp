@@ -190,7 +190,7 @@ private:
     }
 
     static constexpr bool is_wall(int e) { return e >= first_wall; }
-    static constexpr bool is_switch(int e) { return e >= K::events - switches_of<K>(); }
+    static constexpr bool is_switch(int e) { return e >= K::events - K::switches; }
     real side(int e) const { return sides[e - first_wall]; }
 
     void find_events(int e, real until) {
