@@ -307,7 +307,7 @@ private:
     bool finish(const Coefficients& k, real time, real* q, real* p, real* multipliers, Arrays& a) {
         evaluate(k, time, a);
         if (!keeps_constraints(a)) return false;
-        real q1[n], p1[n], G1[slopes], mu[constraints];
+        real q1[n], p1[n], G1[slopes], mu[constraints], not_finite = real(0);
         real pull[constraints];
         for (int c = 0; c < constraints; ++c) pull[c] = multipliers[c * s];
         real y[n];
@@ -322,9 +322,10 @@ private:
             for (int part = 1; part < parts; ++part) total = fused(weight[part], a.f[part * n + c], total);
             q1[c] = a.Q[(last / width) * n + c][last % width];
             p1[c] = p[c] + (h * K::b[0] * y[c] + sum(total));
+            not_finite += (q1[c] - q1[c]) + (p1[c] - p1[c]);
         }
         for (int e = 0; e < slopes; ++e) G1[e] = a.G[(last / width) * slopes + e][last % width];
-        if (!is_finite(not_finite_part(q1, n) + not_finite_part(p1, n)) || !factor(G1, a.B, a.pivots)) return false;
+        if (not_finite != real(0) || !factor(G1, a.B, a.pivots)) return false;
         for (int c = 0; c < constraints; ++c) multipliers[c * s + m] = real(0);
         for (int look = 0; look < 2; ++look) {  // the second takes the rounding of the first away
             real v1[n];

@@ -255,12 +255,14 @@ private:
         } else {
             Formulas<K>::minus_acceleration(k, time + h, q1, W1);
         }
+        real not_finite = real(0);
         for (int c = 0; c < n; ++c) {
             real change = fused(-h * K::b[0], w[c * s + s - 1], u1[c]);
             if constexpr (!with_end) change = fused(-h * K::b[s - 1], W1[c], change);
             u1[c] = u[c] + change;
+            not_finite += (q1[c] - q1[c]) + (u1[c] - u1[c]) + (W1[c] - W1[c]);
         }
-        if (!is_finite(not_finite_part(q1, n) + not_finite_part(u1, n) + not_finite_part(W1, n))) return false;
+        if (not_finite != real(0)) return false;
         remember(q, u, q1, u1, W1, a);
         has_history = true;
         return true;
