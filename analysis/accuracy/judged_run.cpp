@@ -195,7 +195,7 @@ std::vector<std::string> starts_at_jumps(const Scene& scene) {
         start[scene.coordinates[k].velocity] = scene.start == Start::velocity ? scene.initial_rate[k] : GiNaC::ex(0);
     }
     const auto at_start = [&](const GiNaC::ex& formula, const std::string& what) {
-        return std::fabs(scene.evaluate(scene.along_motion(formula).subs(start), what).to_double());
+        return std::fabs(scene.evaluate(scene.along_motion(formula).subs(start).evalf(), what).to_double());
     };
     for (const Switch& one : scene.switches) {
         if (!one.refracts || at_start(one.value, one.text) > 0) continue;

@@ -21,6 +21,7 @@ Verdict Judges::judge(const EnsembleTrajectory& trajectory) {
     Verdict verdict{static_cast<int>(trajectory.status), std::nan("")};
     EnsembleStart start;
     request_.start(trajectory.index, start);
+    look_at_masses(trajectory.index, start.parameters);
     if (verdict.status == LOBATTO_NOT_FINITE && std::isnan(start.q.front())) verdict.status = undefined;
     if (verdict.status != LOBATTO_OK) return verdict;
     {
@@ -33,7 +34,6 @@ Verdict Judges::judge(const EnsembleTrajectory& trajectory) {
         verdict.interrupted = error.interrupted;
         if (error.lost && !accepts_lost_ && verdict.status == LOBATTO_OK) verdict.status = unresolved;
     }
-    look_at_masses(trajectory.index, start.parameters);
     if (!is_defined(trajectory, start)) verdict.status = undefined;
     if (verdict.status == LOBATTO_OK) watch_.observe(trajectory);
     return verdict;

@@ -309,10 +309,11 @@ void SweepStudy::note_warnings() {
     if (!judges_) return;
     if (const Judges::NotPositive& found = judges_->not_positive(); found.count > 0) {
         const std::string values = starts_->text_of(found.first, false);
-        warnings_.push_back(
-            fmt::format("trajectory {}{}: {}. That is allowed, but mostly a value that is not meant{}", found.first,
-                        values.empty() ? "" : ", " + values, found.complaint,
-                        found.count == 1 ? "" : fmt::format("; {} more trajectories are such", found.count - 1)));
+        warnings_.push_back(fmt::format("trajectory {}{}: {}. That is allowed, but mostly a value that is not meant{}",
+                                        found.first, values.empty() ? "" : ", " + values, found.complaint,
+                                        found.count == 1   ? ""
+                                        : found.count == 2 ? "; so it is in another one"
+                                                           : fmt::format("; so it is in {} others", found.count - 1)));
     }
     const std::string warning = judges_->warning();
     if (warning.empty()) return;

@@ -364,7 +364,7 @@ void run(const RunOptions& options) {
     if (!quiet && !options.json) fmt::print("{}: kernel {}, {}\n", scene.path, run.source.digest, origin_text(run));
 
     const TrajectoryHeader header = header_of(scene, run.source, request);
-    const std::string identity = identity_of(request, header, run.compiled.object);
+    const std::string identity = identity_of(scene, request, header, run.compiled.object);
     std::optional<Checkpoint> from;
     if (options.resume) {
         from = checkpoint_of(path, identity, run.kernel, has_events ? 2 : 1, RunObservers::names);

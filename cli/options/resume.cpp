@@ -21,14 +21,18 @@ std::string list(const std::vector<double>& values) {
 
 }  // namespace
 
-std::string identity_of(const TrajectoryRequest& request, const TrajectoryHeader& header, const std::string& object) {
+std::string identity_of(const Scene& scene, const TrajectoryRequest& request, const TrajectoryHeader& header,
+                        const std::string& object) {
     const bool whole = !request.whole_q.empty();
+    std::string columns;
+    for (const Column& column : scene.outputs.columns)
+        if (!column.text.empty()) columns += fmt::format("column {}: {}\n", column.name, column.text);
     return fmt::format(
         "# lobatto {}\n{}positions: {}\nmomenta: {}\nsteps: {}\nevery: {}\ndense: {}\ntolerance: {}\ncompiled kernel: "
-        "{}\n",
+        "{}\n{}",
         LOBATTO_VERSION, text_of(header), list(whole ? request.whole_q : request.q),
         list(whole ? request.whole_p : request.p), request.steps, request.every, request.dense,
-        exact_text(request.tolerance), std::filesystem::path(object).stem().string());
+        exact_text(request.tolerance), std::filesystem::path(object).stem().string(), columns);
 }
 
 void keep_strangers(const std::string& trajectory) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "generator/scene/scene.hpp"
 #include "runtime/build/library.hpp"
 #include "runtime/run/checkpoint.hpp"
 #include "runtime/run/output.hpp"
@@ -13,7 +14,8 @@
 namespace lobatto {
 
 // A text that identifies a run: two runs with the same text have the same bytes. `object`: the compiled kernel.
-std::string identity_of(const TrajectoryRequest& request, const TrajectoryHeader& header, const std::string& object);
+std::string identity_of(const Scene& scene, const TrajectoryRequest& request, const TrajectoryHeader& header,
+                        const std::string& object);
 
 inline std::string checkpoint_path(const std::string& trajectory) {
     return trajectory + ".checkpoint";

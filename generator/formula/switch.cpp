@@ -29,13 +29,23 @@ bool is_tangent(const ex& expression) {
     return is_call(expression, GiNaC::tan_SERIAL::serial);
 }
 
-// Whether sums, products and powers lead from u to a denominator that moves, or to a tangent of what moves.
-bool has_pole(const ex& u, const std::function<bool(const ex&)>& moves) {
-    if (is_tangent(u)) return moves(u.op(0));
-    if (GiNaC::is_a<GiNaC::power>(u) && u.op(1).info(GiNaC::info_flags::negint))
-        return u.op(1).info(GiNaC::info_flags::odd) && moves(u.op(0));
-    const bool is_rational = GiNaC::is_a<GiNaC::add>(u) || GiNaC::is_a<GiNaC::mul>(u) || GiNaC::is_a<GiNaC::power>(u);
-    return is_rational && std::any_of(u.begin(), u.end(), [&](const ex& part) { return has_pole(part, moves); });
+// The denominators in u that move: those of sums, products and powers, cosines of tangents; and whether one stands
+// within another function.
+struct Poles {
+    GiNaC::exset denominators;
+    bool within_function = false;
+};
+void find_poles(const ex& u, const std::function<bool(const ex&)>& moves, bool is_within, Poles& poles) {
+    const bool is_power = GiNaC::is_a<GiNaC::power>(u);
+    const bool is_rational = is_power || GiNaC::is_a<GiNaC::add>(u) || GiNaC::is_a<GiNaC::mul>(u);
+    const bool is_pole = is_tangent(u) || (is_power && u.op(1).info(GiNaC::info_flags::negint) &&
+                                           (is_within || u.op(1).info(GiNaC::info_flags::odd)));
+    if (is_pole && moves(u.op(0))) {
+        poles.denominators.insert(u.op(0));
+        poles.within_function = poles.within_function || is_within;
+    }
+    const bool goes_within = is_within || !(is_rational || is_tangent(u));
+    for (const ex& part : u) find_poles(part, moves, goes_within, poles);
 }
 
 struct WithoutTangents : GiNaC::map_function {
@@ -48,7 +58,11 @@ struct WithoutTangents : GiNaC::map_function {
 }  // namespace
 
 ex without_poles(const ex& u, const std::function<bool(const ex&)>& moves) {
-    if (!has_pole(u, moves)) return u;
+    constexpr std::size_t few = 3;
+    Poles poles;
+    find_poles(u, moves, false, poles);
+    if (poles.denominators.empty()) return u;
+    if (poles.within_function || poles.denominators.size() > few) return GiNaC::atan(u);
     WithoutTangents without_tangents;
     const ex fraction = without_tangents(u).numer_denom();
     return fraction.op(0) * fraction.op(1);

@@ -30,8 +30,8 @@ Operand with_one_sign(int sign, Operand pieces);
 // The base of a power: that form, where the power and its derivative are 0 beyond the switch.
 Operand power_base(const Operand& base, const Operand& exponent, const Arithmetic& arithmetic);
 
-// What has the sign of u and no pole, where u is a fraction whose denominator `moves`: numerator times denominator.
-// A step looks for a zero of it, and u has none where it changes its sign at a pole.
+// What has the sign of u and is finite where u has a pole, because a denominator `moves`. Of a few denominators it is
+// numerator times denominator, which is 0 at the pole; else atan(u), which jumps there.
 GiNaC::ex without_poles(const GiNaC::ex& u, const std::function<bool(const GiNaC::ex&)>& moves);
 // The side of a switch of u, which changes with what u holds.
 Operand as_side(const GiNaC::symbol& symbol, const Operand& u);

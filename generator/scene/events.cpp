@@ -291,11 +291,15 @@ void SystemReader::name_energy_and_momenta() {
 }
 
 void SystemReader::read_columns(const Entry& entry) {
+    std::string definitions;
+    if (const Entry* section = root_.find("definitions"))
+        for (const Entry& line : section->value.entries) definitions += "; " + line.key + " = " + line.value.text.value;
     std::set<std::string> taken = {"H", scene_.has_time ? scene_.time.get_name() : "t"};
+    for (const Constraint& constraint : scene_.constraints) taken.insert("lambda_" + constraint.name);
     for (const Coordinate& coordinate : scene_.coordinates)
         for (const char* prefix : {"", "p_"}) taken.insert(prefix + coordinate.name);
     for (const Column& column : scene_.outputs.columns) taken.insert(column.name);
-    names_.records = false;  // a formula that has no value leaves its cell empty, and ends no motion
+    names_.records = false;  // where a formula has no value the cell is nan, and the motion goes on
     for (const Entry& line : table_of(source_, entry, "columns = { v = \"x'\" }, names with formulas")) {
         if (!is_identifier(line.key))
             fail(line.at, fmt::format("a column has a name of letters, digits and _, such as v, not {}", line.key));
@@ -303,7 +307,8 @@ void SystemReader::read_columns(const Entry& entry) {
             fail(line.at, fmt::format("the table has a column {} already; choose another name", line.key));
         const Scope scope = scope_of("the column " + line.key, true);
         const Operand value = evaluate(source_, parse_formula(source_, formula_of(source_, line), scope), scope);
-        scene_.outputs.columns.push_back({line.key, "", value.expression});
+        const std::string& text = formula_of(source_, line).value;
+        scene_.outputs.columns.push_back({line.key, "", value.expression, collapsed(text + definitions)});
     }
     names_.records = true;
 }

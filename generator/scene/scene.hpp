@@ -75,6 +75,7 @@ struct Column {
     std::string name;
     std::string unit = {};
     GiNaC::ex value = 0;  // in positions, velocities, time and parameters
+    std::string text = {};  // as the scene has it, with its definitions; empty: no formula of the scene
 };
 
 // What a kernel computes beside the motion itself; it has no code for anything else.

@@ -284,6 +284,14 @@ TEST_CASE("what a pulse between the nodes does is measured") {
     }
 }
 
+TEST_CASE("a power whose base has no logarithm is no pulse, and ends no sweep") {
+    const MeasuredScene scene(
+        timed_scene("q'^2/2 - q^2/2 + q*c^(2*t)", swinging, four, 0.1, 4, "[parameters]\nc = 1\n"));
+    const test::Finished done = test::run(
+        {LOBATTO_PROGRAM, "sweep", scene.folder / "scene.toml", "--vary", "c=0,0.5", "-o", scene.folder / "table.csv"});
+    CHECK_MESSAGE(done.exit_code == 0, done.err);
+}
+
 TEST_CASE("the error of a contact is measured wherever it falls within a step") {
     int far = 0;
     for (int i = 0; i < 12; ++i) {

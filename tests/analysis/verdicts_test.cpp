@@ -159,11 +159,16 @@ TEST_CASE("a kinetic energy that is not positive is told") {
     CHECK(run(coils).err.find("the kinetic energy is negative for some velocities, that of b among them") !=
           std::string::npos);
     CHECK(run(std::string(coils).replace(coils.find("1.05"), 4, "0.95")).err.empty());
+    const std::string product =
+        "lagrangian = \"a'*b' - a*b\"\n[coordinates]\na = { position = 1, velocity = 0 }\nb = { position = 1, "
+        "velocity = 0 }\n[run]\nstep = 0.01\nuntil = 1\n";
+    CHECK(run(product).err.find("the kinetic energy is negative for some velocities, that of a among them") !=
+          std::string::npos);
     const lobatto::api::Sweep sweep =
         lobatto::api::sweep(lobatto::api::Scene::from_text(coils), {5, {{"M", {0.5, 0.9, 1.1, 1.2, -1.1}}}});
     REQUIRE(sweep.warnings.size() == 1);
     CHECK(sweep.warnings[0].find("trajectory 2, M = 1.1: the kinetic energy is negative") == 0);
-    CHECK(sweep.warnings[0].find("; 2 more trajectories are such") != std::string::npos);
+    CHECK(sweep.warnings[0].find("; so it is in 2 others") != std::string::npos);
     // A metric of relativity: a light ray's neighbour around a black hole.
     const test::Finished geodesic =
         run("lagrangian = \"(r'^2/(1 - 2/r) - (1 - 2/r)*w'^2 + r^2*phi'^2)/2\"\n[coordinates]\nr = { position = 10, "

@@ -232,6 +232,28 @@ TEST_CASE("a condition that jumps, or has a pole, cuts steps there too") {
                           product = spring("if((y - x)*x > 0, 0.1, 0)", 0.05);
     CHECK(std::fabs(ratio.q[ratio.q.size() - 2] - product.q[product.q.size() - 2]) < 1e-13);
 
+    // Poles within functions and of many denominators, and a jump that is small beside what the condition changes by.
+    const double beyond = [&] {
+        const lob::Trajectory run = spring("if(x > 0, 0.1, 0)", 0.05);
+        return run.q[run.q.size() - 2];
+    }();
+    for (const char* condition : {"exp(1/x) > 2", "1/x > 0", "sinh(1/x) > 0", "1/x^3 + atan2(x, 1) > 0"}) {
+        CAPTURE(condition);
+        const lob::Trajectory run = spring(fmt::format("if({}, 0.1, 0)", condition), 0.05);
+        // exp(1/x) > 2 holds for 0 < x < 1/log 2 = 1.44, which the motion does not leave.
+        CHECK(std::fabs(run.q[run.q.size() - 2] - beyond) < 1e-11);
+    }
+    const std::string fractions =
+        "if(1/(x - 0.1) + 2/(x - 0.3) + 3/(x - 0.45) + 4/(x + 0.2) + 5/(x + 0.7) > 0, 0.1, 0)";
+    const lob::Trajectory summed = spring(fractions, 0.05), finer = spring(fractions, 0.025);
+    CHECK(std::fabs(summed.q[summed.q.size() - 2] - finer.q[finer.q.size() - 2]) < 1e-10);
+    CHECK(summed.error.value() < 1e-9);
+    for (const char* small : {"1e-6", "1e-8", "1e-10"})
+        for (const double step : {0.05, 0.1, 0.2}) {
+            CAPTURE(small);
+            CHECK_NOTHROW(spring(fmt::format("if(y + {}*atan2(y, x) > 0, 0.1, 0)", small), step));
+        }
+
     // Sawtooth carriers: x'' is 1 in a part of each period, from a to b, and x(10) the sum of what each part leads to.
     const double pi = std::acos(-1.0);
     struct Carrier {

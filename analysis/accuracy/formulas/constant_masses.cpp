@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace lobatto {
@@ -11,6 +12,13 @@ namespace {
 
 constexpr std::size_t most_together = 64;  // coordinates; of more their own masses alone are looked at
 constexpr double least_pivot = 1e-12;      // in size, relative to the mass before the elimination
+
+std::string not_positive(const std::string& coordinate) {
+    return fmt::format(
+        "the kinetic energy is negative for some velocities, that of {} among them: the terms between coordinates "
+        "outweigh their masses",
+        coordinate);
+}
 
 }  // namespace
 
@@ -40,12 +48,12 @@ std::string ConstantMasses::complaint(const std::vector<double>& parameters) con
     // M = L D L^T: it is positive where D is.
     for (std::size_t k = 0; together && k < n; ++k) {
         const double pivot = M[k * n + k];
-        if (pivot < -least_pivot * own[k])
-            return fmt::format(
-                "the kinetic energy is negative for some velocities, that of {} among them: the terms between "
-                "coordinates outweigh their masses",
-                coordinates_[k]);
-        if (!(pivot > least_pivot * own[k])) return "";  // singular, which others tell
+        if (pivot < -least_pivot * own[k]) return not_positive(coordinates_[k]);
+        if (!(pivot > least_pivot * own[k])) {
+            const bool is_coupled =
+                std::any_of(&M[k * n + k] + 1, &M[k * n] + n, [](double entry) { return entry != 0; });
+            return is_coupled && own[k] == 0 ? not_positive(coordinates_[k]) : "";  // else singular, which others tell
+        }
         for (std::size_t i = k + 1; i < n; ++i) {
             const double factor = M[i * n + k] / pivot;
             for (std::size_t j = k + 1; factor != 0 && j < n; ++j) M[i * n + j] -= factor * M[k * n + j];

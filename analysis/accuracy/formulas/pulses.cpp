@@ -133,7 +133,10 @@ private:
                              : is_exponential(*part, std::vector{t_}) ? natural_exponent(*part)
                                                                       : part->op(0);
             if (!inner.has(t_) || holds_motion(*part) || !known_.insert(*part).second) continue;
-            visit(*part, inner.subs(values_));
+            try {
+                visit(*part, inner.subs(values_));
+            } catch (const std::exception&) {  // no value with these parameters, as a power of 0 has no logarithm
+            }
         }
     }
     bool holds_motion(const ex& part) const {

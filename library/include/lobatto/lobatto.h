@@ -163,8 +163,8 @@ LOBATTO_C_API const double* lobatto_trajectory_t(const lobatto_trajectory* traje
 LOBATTO_C_API const double* lobatto_trajectory_q(const lobatto_trajectory* trajectory);
 LOBATTO_C_API const double* lobatto_trajectory_p(const lobatto_trajectory* trajectory);
 LOBATTO_C_API const double* lobatto_trajectory_energy(const lobatto_trajectory* trajectory); /* NULL: none is kept */
-/* Beside the state, count x *columns: multipliers that the scene asks for, eliminated coordinates and their velocities,
- * the orientation and angular velocity of bodies. */
+/* Beside the state, count x *columns: multipliers and formulas of the scene, eliminated coordinates and their
+ * velocities, the orientation and angular velocity of bodies. */
 LOBATTO_C_API const double* lobatto_trajectory_columns(const lobatto_trajectory* trajectory, size_t* columns);
 LOBATTO_C_API const char* lobatto_trajectory_column(const lobatto_trajectory* trajectory, size_t index); /* its name */
 LOBATTO_C_API double lobatto_trajectory_error(const lobatto_trajectory* trajectory); /* relative, at the end; NaN */

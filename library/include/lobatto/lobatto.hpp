@@ -252,7 +252,7 @@ struct Trajectory {
     /// count rows. energy is empty where the scene keeps none, unless the motion conserves it.
     std::size_t count = 0;
     std::vector<double> t, q, p, energy;
-    /// count x column_names: multipliers that the scene asks for, eliminated coordinates and their velocities, the
+    /// count x column_names: multipliers and formulas of the scene, eliminated coordinates and their velocities, the
     /// orientation and angular velocity of bodies.
     std::vector<std::string> column_names;
     std::vector<double> columns;

@@ -24,7 +24,8 @@ public:
         stepper = other.stepper;
         started = other.started;
         delete looks;
-        looks = other.looks == nullptr ? nullptr : new Looks(stepper, *other.looks);
+        looks = nullptr;
+        if (other.looks != nullptr) looks = new Looks(stepper, *other.looks);
         return *this;
     }
     ~HybridStepper() { delete looks; }

@@ -106,7 +106,8 @@ struct SampledFunction {
         }
         const bool jumps = may_tell && nearest.value != real(0) && fabs(b.value - a.value) > real(0.5) * change;
         is_root = is_finite(nearest.value) && ((fabs(nearest.value) <= largest && !jumps) || may_jump);
-        return jumps && may_jump ? b.theta : nearest.theta;
+        const bool is_before = nearest.value != real(0) && !changes(nearest.value, a.value);
+        return may_jump && (jumps || is_before) ? b.theta : nearest.theta;
     }
 };
 
