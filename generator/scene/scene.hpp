@@ -74,7 +74,7 @@ struct Reduction {
 struct Column {
     std::string name;
     std::string unit = {};
-    GiNaC::ex value = 0;  // in positions, velocities, time and parameters
+    GiNaC::ex value = 0;    // in positions, velocities, time and parameters
     std::string text = {};  // as the scene has it, with its definitions; empty: no formula of the scene
 };
 
