@@ -367,7 +367,7 @@ def test_values_of_another_kind_are_refused(pendulum):
         with pytest.raises(lobatto.InputError, match="a sweep needs a start"):
             lobatto.sweep(pendulum, starts)
     orbit = lobatto.Lagrangian(KEPLER, x="1 - e", y=(0, "sqrt((1 + e)/(1 - e))"), e=0.5)
-    with pytest.warns(UserWarning, match="2 of 2 trajectories failed: 2 not finite"):
+    with pytest.warns(UserWarning, match="2 of 2 trajectories failed: 2 a formula has no value there"):
         assert not lobatto.sweep(orbit, {"e": [numpy.nan, numpy.inf]}, until=1).ok.any()
     assert lobatto.sweep(orbit, {"e": [1e-310, 0.1]}, until=1).ok.all()
     third = lobatto.Lagrangian("m*x'^2/2 - x^2/2", x=numpy.float64(1), m=fractions.Fraction(1, 3))
@@ -377,6 +377,29 @@ def test_values_of_another_kind_are_refused(pendulum):
     with pytest.raises(lobatto.InputError, match="restitution"):
         ball.set("e", -1)
     assert ball.parameter("e") == before and ball.step()
+
+
+def test_a_state_is_taken_with_its_inputs():
+    slot = lobatto.Stepper(lobatto.Scene.from_text(
+        'lagrangian = "y\'^2/2"\n[coordinates]\ny = { position = 0.5, velocity = 0 }\n[inputs]\nlo = 0\nhi = 1\n'
+        '[impacts]\nfloor = { when = "y = lo falling" }\nceiling = { when = "y = hi rising" }\n'
+        '[run]\nstep = 0.01\nuntil = 1\n'))
+    with pytest.raises(lobatto.ComputationError, match="behind the wall"):
+        slot.start(7, [2.5], [0.25])
+    slot.start(7, [2.5], [0.25], inputs=[2, 3])
+    assert slot.t == 7 and slot.q[0] == 2.5 and slot.parameter("hi") == 3
+    with pytest.raises(lobatto.InputError, match="inputs is a list of 2 numbers"):
+        slot.start(7, [2.5], [0.25], inputs=[2])
+
+
+def test_states_between_dense_rows_begin_at_steps():
+    text = ('lagrangian = "x\'^2/2 - x^2/2 - x^4/4"\n[coordinates]\nx = { position = 1, velocity = 0 }\n'
+            '[method]\nfamily = "gauss"\nstages = 4\n[run]\nstep = 0.4\nuntil = 20\n')
+    times = numpy.linspace(0, 20, 201)
+    plain = lobatto.run(lobatto.Scene.from_text(text))(times)
+    dense = lobatto.run(lobatto.Scene.from_text(text + "[output]\ndense = 3\ncolumns = { v = \"x'\" }\n"))
+    assert (dense(times).q == plain.q).all() and (dense(times).velocity == plain.velocity).all()
+    assert dense["v"] == pytest.approx(dense["p_x"])
 
 
 def test_warnings_are_warnings(pendulum):
