@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "generator/formula/switch.hpp"
 
-#include <algorithm>
-
 namespace lobatto {
 namespace {
 
