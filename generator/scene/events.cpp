@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Events and stops of a scene, and the walls of [impacts].
+// Events, stops and switches of a scene, the walls of [impacts], and what is kept of a motion: `keep`, `columns`.
 #include <fmt/format.h>
 
 #include <algorithm>
